@@ -1,0 +1,97 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/expected.hpp"
+#include "base/frames.hpp"
+#include "drivers/pivot/session.hpp"
+#include "drivers/robot/session.hpp"
+#include "drivers/scanner/lms400/session.hpp"
+#include "plc/session.hpp"
+#include "vision/grasp.hpp"
+#include "vision/knowledge_base.hpp"
+#include "vision/registration.hpp"
+
+/// The cell file as values: what `binpick check` validates and the daemon runs on.
+namespace binpick::config {
+struct Supply {
+  std::uint16_t id = 0;
+  std::string name;
+  Eigen::Vector3d size_mm = Eigen::Vector3d::Zero();  ///< Inner x, y, wall height.
+  Transform<frame::Base, frame::Supply> T_base_supply;
+  /// The sweep over it.
+  Angle sweep_start, sweep_end;
+  double sweep_speed_rad_s = 0.5;
+  friend bool operator==(const Supply&, const Supply&);
+};
+
+/// A PART.toml.
+struct Part {
+  std::string path;       ///< Of the PART.toml.
+  std::string mesh_path;  ///< Resolved against the PART.toml's folder.
+  double mesh_unit_mm = 1;
+  bool conveyor = false;
+  vision::PartOptions options;
+  std::vector<vision::Grasp> grasps;
+};
+
+/// One [[part]] entry of the cell file.
+struct Recipe {
+  std::uint16_t id = 0;
+  Part part;
+  std::string knowledge_base;          ///< Path, resolved against the cell file's folder.
+  double score_min = 0.5;              ///< A detection below is not offered.
+  std::optional<double> tilt_max_rad;  ///< Overrides the cell's.
+};
+
+struct Detection {
+  int threads = 2;
+  std::chrono::milliseconds deadline{3000};
+};
+
+struct Config {
+  std::string path;
+  std::string name;
+  std::string plc_listen;  ///< "host:port".
+  plc::Options plc;
+  std::string pivot_can;                    ///< "can0" or "cannelloni://HOST:PORT".
+  std::uint16_t pivot_can_listen_port = 0;  ///< Local UDP port for cannelloni, 0: any.
+  drivers::pivot::Options pivot;
+  Duration pivot_latency{0};    ///< Added to the time of each position sample.
+  std::string scanner_address;  ///< "host:port".
+  drivers::lms400::Options scanner;
+  Duration scanner_latency{0};  ///< Measured this much before the smoothed receive time.
+  vision::ScannerMount mount;
+  std::string robot_listen;
+  std::vector<std::string> robot_allow;
+  drivers::robot::Options robot;
+  std::vector<Supply> supplies;
+  std::vector<Recipe> recipes;
+  vision::ReachLimits reach;
+  Detection detection;
+  std::string picture_dir;  ///< A PNG per cycle goes here; empty: none.
+  std::string state_dir;    ///< boot_count lives here.
+};
+
+/// One finding, in the form file:line:col: message, the line, a caret, the remedy.
+struct Diagnostic {
+  std::string file;
+  int line = 0;
+  int column = 0;
+  int length = 1;       ///< Caret and tildes.
+  std::string message;  ///< What is wrong; what to do.
+  std::string source;   ///< The line itself.
+};
+std::string to_string(const Diagnostic& diagnostic);
+
+/// Validates everything and returns all findings at once. Part files are read too; knowledge bases are not opened.
+Expected<Config, std::vector<Diagnostic>> load(const std::string& path);
+/// The same for one PART.toml.
+Expected<Part, std::vector<Diagnostic>> load_part(const std::string& path);
+
+/// Keys whose change takes effect only with a restart, by name ("plc.listen"), of those that differ between two files.
+std::vector<std::string> needs_restart(const Config& running, const Config& edited);
+}  // namespace binpick::config

@@ -1,0 +1,1 @@
+// Anchors the library until its devices are in.

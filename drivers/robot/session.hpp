@@ -1,0 +1,69 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+
+#include "base/bytes.hpp"
+#include "base/clock.hpp"
+#include "base/frames.hpp"
+
+/// The robot's socket as a session without I/O: the robot is the client, the cell the server.
+namespace binpick::drivers::robot {
+enum class Dialect { UniversalRobots };
+
+struct Options {
+  Dialect dialect = Dialect::UniversalRobots;
+  std::chrono::seconds silence_max{60};  ///< A robot that says nothing for this long is taken for gone.
+};
+
+/// What the robot gets for a fetch. The same pick under the same id until it is reported or withdrawn.
+struct Pick {
+  std::uint16_t pick_id = 0;   ///< 1 … 65535; the PLC has the same id.
+  std::uint16_t sequence = 0;  ///< The PLC's request that it answers.
+  std::uint16_t part_id = 0;
+  std::uint16_t objects_left = 0;
+  Transform<frame::Base, frame::Tcp> T_base_approach;
+  Transform<frame::Base, frame::Tcp> T_base_grasp;
+};
+/// Why there is no pick to fetch.
+enum class NoPick : std::uint16_t { NotReady = 0, SupplyEmpty = 10, NothingFound = 11, NotReachable = 12, Fault = 40 };
+
+struct Connected {};
+struct Fetched {
+  std::uint16_t pick_id;
+};  ///< The pick was sent to the robot (again, perhaps).
+struct Reported {
+  std::uint16_t pick_id;
+  bool done;
+};
+struct Lost {
+  std::string text;
+};
+using Event = std::variant<Connected, Fetched, Reported, Lost>;
+
+class Session {
+ public:
+  explicit Session(const Options& options);
+
+  void on_connected(TimePoint now);  ///< A new connection replaces the old one.
+  void on_bytes(ByteView bytes, TimePoint now);
+  void on_disconnected(TimePoint now);
+  void on_deadline(TimePoint now);
+  std::optional<TimePoint> deadline() const;
+  Bytes take_output();
+  std::optional<Event> take_event();
+  bool take_reopen();  ///< True once when the connection must be closed.
+  bool connected() const;
+
+  void offer(const Pick& pick);
+  void withdraw(NoPick reason);
+
+ private:
+  struct Impl;
+  std::shared_ptr<Impl> impl_;
+};
+}  // namespace binpick::drivers::robot

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+
+namespace binpick::plc {
+/// Alarm codes as the PLC reads them. Values never change. Cause and cure of each stand in alarm_table().
+enum class Alarm : std::uint16_t {
+  None = 0,
+  PivotNoReply = 100,
+  PivotModuleError = 101,
+  PivotPowerFault = 102,  ///< Motor supply gone: emergency stop, most often.
+  PivotBusOff = 103,
+  PivotReferenceFailed = 104,
+  ScannerNoReply = 200,
+  ScannerBadTelegrams = 201,
+  ScannerRefused = 202,
+  ScannerNoProfiles = 203,
+  ScannerProfilesLost = 204,
+  RobotLost = 300,
+  RobotBadLine = 301,
+  PlcLost = 400,
+  PlcHeartbeatStopped = 401,
+  PlcSecondWriter = 402,
+  ScanTimeout = 500,
+  DetectTimeout = 501,
+  RobotNotClear = 502,
+  VisionFailed = 600,
+  ConfigurationRefused = 700,  ///< A reload was refused; the old configuration is in force.
+  ConfigurationNeedsRestart = 701,
+};
+}  // namespace binpick::plc

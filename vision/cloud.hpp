@@ -1,0 +1,17 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "base/expected.hpp"
+
+namespace binpick::vision {
+struct CloudError {
+  std::string text;  ///< What, where, what to do.
+};
+/// PLY, ASCII or binary little-endian, vertices x y z (float or double), millimetres; other properties and elements are
+/// skipped. Points that are not finite are dropped; a cloud without one finite point is an error.
+Expected<std::vector<Eigen::Vector3f>, CloudError> load_cloud(const std::string& path);
+Expected<void, CloudError> save_cloud(const std::string& path, const std::vector<Eigen::Vector3f>& points_mm);
+}  // namespace binpick::vision

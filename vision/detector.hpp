@@ -1,0 +1,53 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <chrono>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/frames.hpp"
+#include "vision/depth_image.hpp"
+#include "vision/knowledge_base.hpp"
+
+namespace binpick::vision {
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+
+struct DetectorOptions {
+  int hypotheses_max = 4096;                          ///< Bound of the hypotheses that are tested.
+  std::optional<double> noise_mm;                     ///< Expected depth noise, 1 sd; default: the knowledge base's.
+  std::optional<std::chrono::milliseconds> deadline;  ///< Return the best so far.
+  int threads = 2;                                    ///< The result does not depend on it.
+  int detections_max = 0;                             ///< 0: unlimited.
+};
+
+struct Detection {
+  Transform<frame::Supply, frame::Object> T_supply_object;
+  double score = 0.0;             ///< Probability that this detection is right, 0 … 1.
+  double visible_fraction = 0.0;  ///< Share of the silhouette that is the top surface, 0 … 1.
+  Matrix6 covariance =
+      Matrix6::Zero();  ///< Of (translation mm, rotation rad), supply axes, at the part's surface centroid.
+};
+
+struct Rejection {
+  Transform<frame::Supply, frame::Object> T_supply_object;
+  double score = 0.0;
+  std::string reason;  ///< "free space seen through it", "edges missing", "explained by a better one" …
+};
+
+/// What happened, also when nothing was found: the operator's question is "why not?".
+struct DetectionReport {
+  std::vector<Detection> detections;  ///< Best first.
+  std::vector<Rejection> rejected;    ///< Strongest hypotheses not believed, each with its reason.
+  std::size_t maxima = 0;
+  std::size_t hypotheses = 0;  ///< Tested against the depth image.
+  std::map<std::string, double> stages_ms;
+  double time_ms = 0;
+};
+
+/// Finds objects of one part in one depth image. An empty supply is a report without detections, not an error.
+/// Bounded by options; touches nothing but its arguments; same input, same result.
+DetectionReport detect(const DepthImage& image, const SupplyBox& supply, const KnowledgeBase& part,
+                       const DetectorOptions& options);
+}  // namespace binpick::vision

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/frames.hpp"
+#include "vision/detector.hpp"
+
+namespace binpick::vision {
+/// How a gripper takes a part. The tcp's z axis is the direction of approach.
+struct Grasp {
+  std::string name;
+  Transform<frame::Object, frame::Tcp> T_object_tcp;
+  double approach_mm = 100;  ///< The approach pose stands this far back along tcp z.
+};
+
+struct ReachLimits {
+  double tilt_max_rad = 0.7;     ///< Between tcp z and straight down (-z of the supply).
+  double wall_clearance_mm = 0;  ///< The tcp stays this far inside the supply's walls.
+};
+
+struct Reachable {
+  std::size_t detection = 0;  ///< Index in the report.
+  std::size_t grasp = 0;
+  Transform<frame::Supply, frame::Tcp> T_supply_grasp;
+  Transform<frame::Supply, frame::Tcp> T_supply_approach;
+};
+struct Unreachable {
+  std::size_t detection = 0;
+  std::string reason;  ///< "tilt 51 deg is over 40 deg", "tcp 12 mm outside the wall x max".
+};
+struct GraspChoice {
+  std::vector<Reachable> reachable;  ///< Best first: believed most, then highest.
+  std::vector<Unreachable>
+      unreachable;  ///< Detections without any reachable grasp, with the reason of the least bad one.
+};
+
+/// Grasps are tried in every pose that the part's symmetry allows (a revolution in steps of 15 degrees).
+GraspChoice choose_grasps(const DetectionReport& report, const Symmetry& symmetry, const std::vector<Grasp>& grasps,
+                          const SupplyBox& supply, const ReachLimits& limits);
+}  // namespace binpick::vision

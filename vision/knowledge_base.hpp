@@ -1,0 +1,83 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "base/expected.hpp"
+#include "vision/mesh.hpp"
+#include "vision/symmetry.hpp"
+
+namespace binpick::vision {
+/// Device class that will see the part: expected noise and point spacing (datasheet figures, partly from memory; one
+/// table in the code, scanner_class_table()).
+enum class ScannerClass { Lps36Hi, Lps36, Lms400 };
+
+struct ScannerFigures {
+  double noise_mm;           ///< 1 sd at normal incidence.
+  double spacing_along_mm;   ///< Between profiles.
+  double spacing_across_mm;  ///< Between points of one profile at stand_off_mm.
+  double stand_off_mm;
+};
+const ScannerFigures& figures_of(ScannerClass scanner);
+
+/// What a PART.toml says; an absent value has a default derived from the mesh (see resolve in training).
+struct PartOptions {
+  std::string name;
+  std::optional<ScannerClass> scanner;  ///< Default: Lps36 under 150 mm diameter, else Lms400.
+  std::optional<double> pixel_mm;
+  std::optional<int> rotations;      ///< Training rotations before the symmetry reduces them.
+  std::optional<Symmetry> symmetry;  ///< Default: found from the mesh.
+  std::optional<double> symmetry_tolerance_mm;
+  std::optional<int> votes_per_feature_max;
+  std::uint64_t seed = 1;
+};
+
+struct TrainingProgress {
+  double fraction;
+};
+struct TrainingSummary {
+  Symmetry symmetry;
+  int rotations = 0;
+  std::uint64_t votes = 0;
+  double mib = 0;
+  double seconds = 0;
+};
+
+struct KnowledgeBaseError {
+  enum class Kind { CannotOpen, NotAKnowledgeBase, Version, Truncated, Checksum } kind = Kind::CannotOpen;
+  std::string text;  ///< What, where, what to do.
+};
+
+/// Everything detection needs to know of one part: mesh, symmetry, views, features and votes. Immutable, shared freely
+/// between threads (cheap copies).
+class KnowledgeBase {
+ public:
+  /// Reads and verifies the whole file (version, length, checksum).
+  static Expected<KnowledgeBase, KnowledgeBaseError> open(const std::string& path);
+  Expected<void, KnowledgeBaseError> save(const std::string& path) const;
+
+  const std::string& part_name() const;
+  const Mesh& mesh() const;
+  const Symmetry& symmetry() const;
+  ScannerClass scanner() const;
+  double pixel_mm() const;
+  double noise_mm() const;
+  double diameter_mm() const;
+
+  struct Impl;
+  explicit KnowledgeBase(std::shared_ptr<const Impl> impl);
+  const Impl& impl() const { return *impl_; }  ///< For vision/ itself (knowledge_base_impl.hpp).
+
+ private:
+  std::shared_ptr<const Impl> impl_;
+};
+
+/// Renders the mesh in every training rotation and stores votes (docs/vision.md, training).
+/// Deterministic for the same mesh and options. `progress` may be empty.
+Expected<KnowledgeBase, MeshError> train(const Mesh& mesh, const PartOptions& options,
+                                         const std::function<void(TrainingProgress)>& progress,
+                                         TrainingSummary* summary, int threads = 0);
+}  // namespace binpick::vision
