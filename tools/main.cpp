@@ -1,0 +1,65 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <string>
+
+#include "tools/commands.hpp"
+
+namespace {
+/// CLI11's texts may span lines; an error of this command is one line.
+std::string one_line(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  while (!text.empty() && text.back() == ' ') text.pop_back();
+  return text;
+}
+
+/// "binpick train" of a line that began so: whose help is worth reading.
+std::string spoken_to(const CLI::App& app) {
+  const auto chosen = app.get_subcommands();
+  return chosen.empty() ? app.get_name() : app.get_name() + " " + chosen.front()->get_name();
+}
+}  // namespace
+
+int main(int argc, char** argv) {
+  using namespace binpick;
+  CLI::App app{"The command beside binpickd: check a cell, reach its devices, train parts, detect them.", "binpick"};
+  app.require_subcommand(1);
+  app.set_version_flag("--version", "binpick " BINPICK_VERSION);
+  int exit_status = 0;
+#ifdef BINPICK_HAS_CHECK
+  tools::add_check(app, exit_status);
+#endif
+#ifdef BINPICK_HAS_PROBE
+  tools::add_probe(app, exit_status);
+#endif
+#ifdef BINPICK_HAS_SCAN
+  tools::add_scan(app, exit_status);
+#endif
+#ifdef BINPICK_HAS_TRAIN
+  tools::add_train(app, exit_status);
+#endif
+#ifdef BINPICK_HAS_DETECT
+  tools::add_detect(app, exit_status);
+#endif
+  // CLI11 would only say that a subcommand is missing.
+  if (argc > 1 && argv[1][0] != '-' && app.get_subcommand_no_throw(argv[1]) == nullptr) {
+    std::string names;
+    for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
+      names += (names.empty() ? "" : ", ") + command->get_name();
+    std::fprintf(stderr, "binpick: no command '%s'; there are: %s\n", one_line(argv[1]).c_str(), names.c_str());
+    return 2;
+  }
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    if (e.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) return app.exit(e);  // --help, --version
+    std::fprintf(stderr, "binpick: %s; '%s --help' says what it takes\n", one_line(e.what()).c_str(),
+                 spoken_to(app).c_str());
+    return 2;
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "binpick: %s\n", one_line(e.what()).c_str());
+    return 1;
+  }
+  return exit_status;
+}
