@@ -43,12 +43,17 @@ int main(int argc, char** argv) {
   tools::add_detect(app, exit_status);
 #endif
   // CLI11 would only say that a subcommand is missing.
-  if (argc > 1 && argv[1][0] != '-' && app.get_subcommand_no_throw(argv[1]) == nullptr) {
+  if (argc > 1 && argv[1][0] != '-') {
     std::string names;
-    for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
+    bool known = false;
+    for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
       names += (names.empty() ? "" : ", ") + command->get_name();
-    std::fprintf(stderr, "binpick: no command '%s'; there are: %s\n", one_line(argv[1]).c_str(), names.c_str());
-    return 2;
+      known = known || command->get_name() == argv[1];
+    }
+    if (!known) {
+      std::fprintf(stderr, "binpick: no command '%s'; there are: %s\n", one_line(argv[1]).c_str(), names.c_str());
+      return 2;
+    }
   }
   try {
     app.parse(argc, argv);
