@@ -2,7 +2,9 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -25,6 +27,11 @@ struct MeshError {
 /// Reads STL, OBJ or PLY (assimp). `unit_mm` is the length of one file unit. No triangles, non-finite vertices or an
 /// unreadable file are errors.
 Expected<Mesh, MeshError> load_mesh(const std::string& path, double unit_mm);
+/// The same for a file's bytes; `format` is "stl", "obj" or "ply", `name` stands in the messages.
+Expected<Mesh, MeshError> parse_mesh(std::span<const std::byte> bytes, const std::string& format, double unit_mm,
+                                     const std::string& name);
+/// Merges vertices of equal place, drops degenerate and duplicate triangles and vertices that nobody uses.
+Mesh cleaned(const Mesh& mesh);
 /// Binary STL, millimetres.
 Expected<void, MeshError> save_stl(const Mesh& mesh, const std::string& path);
 /// Of the triangles' coordinates, in order: a knowledge base names the mesh it was trained from by this.

@@ -1,0 +1,69 @@
+#include "vision/file.hpp"
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+namespace binpick::vision {
+namespace {
+constexpr std::size_t kFileBytesMax = std::size_t{1} << 31;
+
+struct Descriptor {
+  int fd;
+  ~Descriptor() {
+    if (fd >= 0) ::close(fd);
+  }
+};
+}  // namespace
+
+Expected<std::vector<std::byte>, std::string> read_file(const std::string& path) {
+  const auto failed = [&](const std::string& why) {
+    return unexpected("cannot read " + path + ": " + why + "; check the path and its permissions");
+  };
+  const Descriptor file{::open(path.c_str(), O_RDONLY | O_CLOEXEC)};
+  if (file.fd < 0) return failed(std::strerror(errno));
+  struct stat status {};
+  if (::fstat(file.fd, &status) != 0) return failed(std::strerror(errno));
+  if (S_ISDIR(status.st_mode)) return failed("it is a folder");
+  std::vector<std::byte> bytes;
+  if (status.st_size > 0 && static_cast<std::size_t>(status.st_size) <= kFileBytesMax)
+    bytes.reserve(static_cast<std::size_t>(status.st_size) + 1);
+  // Until the end, not until st_size: pipes have none.
+  for (;;) {
+    const std::size_t held = bytes.size();
+    const std::size_t room = bytes.capacity() > held ? bytes.capacity() - held : 65536;
+    bytes.resize(held + room);
+    const ssize_t got = ::read(file.fd, bytes.data() + held, room);
+    bytes.resize(held + (got > 0 ? static_cast<std::size_t>(got) : 0));
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) return failed(std::strerror(errno));
+    if (got == 0) return bytes;
+    if (bytes.size() > kFileBytesMax) return failed("it is larger than 2 GiB");
+  }
+}
+
+Expected<void, std::string> write_file(const std::string& path, std::span<const std::byte> bytes) {
+  const std::string beside = path + ".part" + std::to_string(::getpid());
+  const auto failed = [&] {
+    const std::string why = std::strerror(errno);
+    ::unlink(beside.c_str());
+    return unexpected("cannot write " + path + ": " + why + "; check the folder, its permissions and its free space");
+  };
+  {
+    const Descriptor file{::open(beside.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644)};
+    if (file.fd < 0) return failed();
+    while (!bytes.empty()) {
+      const ssize_t put = ::write(file.fd, bytes.data(), bytes.size());
+      if (put < 0 && errno == EINTR) continue;
+      if (put < 0) return failed();
+      bytes = bytes.subspan(static_cast<std::size_t>(put));
+    }
+    if (::fsync(file.fd) != 0) return failed();
+  }
+  if (std::rename(beside.c_str(), path.c_str()) != 0) return failed();
+  return {};
+}
+}  // namespace binpick::vision
