@@ -31,7 +31,8 @@ struct Unreachable {
   std::string reason;  ///< "tilt 51 deg is over 40 deg", "tcp 12 mm outside the wall x max".
 };
 struct GraspChoice {
-  std::vector<Reachable> reachable;  ///< Best first: believed most, then highest.
+  /// At most one per detection, its steepest; best first: believed most (in steps of 0.02), then highest.
+  std::vector<Reachable> reachable;
   std::vector<Unreachable>
       unreachable;  ///< Detections without any reachable grasp, with the reason of the least bad one.
 };
