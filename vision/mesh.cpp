@@ -1,5 +1,6 @@
 #include "vision/mesh.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <assimp/Importer.hpp>
 #include <assimp/config.h>
