@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "base/overloaded.hpp"
+
 namespace binpick::drivers::sweep {
 namespace {
 /// The scanner's spin-up may take seconds after a change of frequency; the pivot's drive to the start as well.
@@ -12,12 +14,6 @@ constexpr Duration kDrainMax = std::chrono::milliseconds(300);
 constexpr Duration kSweepSlack = std::chrono::seconds(2);
 constexpr std::size_t kWaitingMax = 2000;  // 4 s of profiles at the highest rate
 
-template <class... F>
-struct Overloaded : F... {
-  using F::operator()...;
-};
-template <class... F>
-Overloaded(F...) -> Overloaded<F...>;
 }  // namespace
 
 void Sweep::begin(const Plan& plan, TimePoint now) {

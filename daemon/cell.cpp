@@ -1,0 +1,433 @@
+#include "daemon/cell.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/check.hpp"
+#include "base/log.hpp"
+#include "base/overloaded.hpp"
+#include "vision/registration.hpp"
+
+namespace binpick::daemon {
+namespace {
+/// To the start of a sweep the pivot drives with this share of what the module can do.
+constexpr double kPositioningShare = 0.4;
+
+plc::Options with_ids(const config::Config& config) {
+  plc::Options options = config.plc;
+  options.part_ids.clear();
+  options.supply_ids.clear();
+  for (const auto& recipe : config.recipes) options.part_ids.push_back(recipe.id);
+  for (const auto& supply : config.supplies) options.supply_ids.push_back(supply.id);
+  return options;
+}
+
+plc::Alarm alarm_of(const drivers::pivot::Failed& failed) {
+  using Why = drivers::pivot::Failed::Why;
+  switch (failed.why) {
+    case Why::NoReply:
+      return plc::Alarm::PivotNoReply;
+    case Why::BusDown:
+      return plc::Alarm::PivotNoReply;
+    case Why::BusOff:
+      return plc::Alarm::PivotBusOff;
+    case Why::ModuleError:
+      return plc::Alarm::PivotModuleError;
+    case Why::PowerFault:
+      return plc::Alarm::PivotPowerFault;
+    case Why::ReferenceFailed:
+      return plc::Alarm::PivotReferenceFailed;
+    case Why::MoveRefused:
+      return plc::Alarm::PivotModuleError;
+  }
+  return plc::Alarm::PivotModuleError;
+}
+
+plc::Alarm alarm_of(const drivers::lms400::Failed& failed) {
+  using Why = drivers::lms400::Failed::Why;
+  switch (failed.why) {
+    case Why::NoReply:
+      return plc::Alarm::ScannerNoReply;
+    case Why::BadTelegram:
+      return plc::Alarm::ScannerBadTelegrams;
+    case Why::Refused:
+      return plc::Alarm::ScannerRefused;
+    case Why::NoProfiles:
+      return plc::Alarm::ScannerNoProfiles;
+    case Why::LinkLost:
+      return plc::Alarm::ScannerNoReply;
+  }
+  return plc::Alarm::ScannerNoReply;
+}
+
+std::uint16_t to_u16(double value) { return static_cast<std::uint16_t>(std::clamp(std::lround(value), 0L, 65535L)); }
+}  // namespace
+
+Cell::Cell(std::shared_ptr<const CellData> data, std::uint16_t boot_count)
+    : data_{std::move(data)},
+      plc_{with_ids(data_->config), boot_count},
+      pivot_{data_->config.pivot},
+      scanner_{data_->config.scanner},
+      robot_{data_->config.robot},
+      sweep_{pivot_, scanner_} {
+  robot_.withdraw(drivers::robot::NoPick::NotReady);
+}
+
+void Cell::run(TimePoint now) {
+  const auto due = [&](std::optional<TimePoint> at) { return at && *at <= now; };
+  if (due(plc_.deadline())) plc_.on_deadline(now);
+  if (due(pivot_.deadline())) pivot_.on_deadline(now);
+  if (due(scanner_.deadline())) scanner_.on_deadline(now);
+  if (due(robot_.deadline())) robot_.on_deadline(now);
+  if (due(sweep_.deadline())) sweep_.on_deadline(now);
+  // An event may cause others; a bound shows a ring of them as our error instead of a hang.
+  int rounds = 0;
+  while (drain(now)) BINPICK_CHECK(++rounds < 10'000);
+  if (edited_ && state_ == CellState::Idle) put_in_force(now);
+  update_ready(now);
+}
+
+bool Cell::drain(TimePoint now) {
+  bool any = false;
+  while (auto event = pivot_.take_event()) on(*event, now), any = true;
+  while (auto event = scanner_.take_event()) on(*event, now), any = true;
+  while (auto event = sweep_.take_event()) on(*event, now), any = true;
+  while (auto event = robot_.take_event()) on(*event, now), any = true;
+  while (auto event = plc_.take_event()) on(*event, now), any = true;
+  return any;
+}
+
+std::optional<TimePoint> Cell::deadline() const {
+  return earlier(earlier(earlier(plc_.deadline(), pivot_.deadline()), earlier(scanner_.deadline(), robot_.deadline())),
+                 sweep_.deadline());
+}
+
+std::optional<DetectRequest> Cell::take_detect_request() { return std::exchange(detect_request_, std::nullopt); }
+
+void Cell::on_detect_result(DetectResult result, TimePoint now) {
+  if (result.cycle_id != cycle_id_ || state_ != CellState::Detecting) {
+    BINPICK_LOG(Info, "cell", "late detection of cycle %llu dropped", static_cast<unsigned long long>(result.cycle_id));
+    return;
+  }
+  if (!result.error.empty()) {
+    cycle_alarm_ = plc::Alarm::VisionFailed;
+    BINPICK_LOG(Error, "vision", "detection failed: %s; the scan is given up, ask again", result.error.c_str());
+    apply(CellInput::DetectionFailed, now);
+    return;
+  }
+  detect_result_ = std::move(result);
+  apply(CellInput::DetectionDone, now);
+}
+
+void Cell::reload(std::shared_ptr<const CellData> data, TimePoint now) {
+  edited_ = std::move(data);
+  if (state_ == CellState::Idle) put_in_force(now);
+}
+
+void Cell::reload_refused(const std::vector<std::string>& findings, TimePoint now) {
+  for (const auto& finding : findings) BINPICK_LOG(Error, "config", "%s", finding.c_str());
+  BINPICK_LOG(Error, "config", "reload refused (%zu findings); the old configuration stays in force", findings.size());
+  plc_.raise(plc::Alarm::ConfigurationRefused, now);
+}
+
+void Cell::put_in_force(TimePoint now) {
+  const auto restart = config::needs_restart(data_->config, edited_->config);
+  data_ = std::exchange(edited_, nullptr);
+  plc_.reconfigure(with_ids(data_->config), now);
+  plc_.clear(plc::Alarm::ConfigurationRefused, now);
+  BINPICK_LOG(Notice, "config", "%s is in force", data_->config.path.c_str());
+  if (restart.empty()) {
+    plc_.clear(plc::Alarm::ConfigurationNeedsRestart, now);
+    return;
+  }
+  std::string names;
+  for (const auto& name : restart) names += (names.empty() ? "" : ", ") + name;
+  BINPICK_LOG(Warning, "config", "changed, but in force only after a restart: %s", names.c_str());
+  plc_.raise(plc::Alarm::ConfigurationNeedsRestart, now);
+}
+
+void Cell::shut_down(TimePoint now) {
+  stopping_ = true;
+  apply(CellInput::Cancelled, now);
+  pivot_.stop(now);
+  robot_.withdraw(drivers::robot::NoPick::NotReady);
+  update_ready(now);
+}
+
+bool Cell::safe() const {
+  return state_ == CellState::Idle && pivot_.state() != drivers::pivot::Session::State::Moving;
+}
+
+void Cell::update_ready(TimePoint now) {
+  using plc::NotReady;
+  unsigned reasons = 0;
+  const auto pivot = pivot_.state();
+  const auto scanner = scanner_.state();
+  if (pivot != drivers::pivot::Session::State::Standing && pivot != drivers::pivot::Session::State::Moving)
+    reasons |= static_cast<unsigned>(NotReady::Pivot);
+  if (scanner != drivers::lms400::Session::State::Idle && scanner != drivers::lms400::Session::State::Measuring)
+    reasons |= static_cast<unsigned>(NotReady::Scanner);
+  if (!data_->config.robot_listen.empty() && !robot_.connected()) reasons |= static_cast<unsigned>(NotReady::Robot);
+  if (stopping_) reasons |= static_cast<unsigned>(NotReady::Stopping);
+  plc_.set_not_ready(static_cast<std::uint16_t>(reasons), now);
+}
+
+void Cell::apply(CellInput input, TimePoint now) {
+  const CellRow* row = find_cell_row(state_, input);
+  if (row == nullptr) return;
+  state_ = row->to;
+  switch (row->effect) {
+    case CellEffect::None:
+      break;
+    case CellEffect::BeginSweep:
+      begin_sweep(now);
+      break;
+    case CellEffect::StartDetection:
+      start_detection(now);
+      break;
+    case CellEffect::Publish:
+      publish(now);
+      break;
+    case CellEffect::FaultCycle:
+      stop_cycle(now);
+      plc_.fault(cycle_alarm_, now);
+      break;
+    case CellEffect::StopQuietly:
+      stop_cycle(now);
+      break;
+  }
+}
+
+void Cell::begin_sweep(TimePoint now) {
+  const auto& supply = data_->config.supplies[supply_];
+  const auto& part = data_->knowledge_bases[recipe_];
+  const Eigen::Vector2d half = supply.size_mm.head<2>() / 2;
+  builder_.emplace(part.pixel_mm(), -half, half);
+  drivers::sweep::Plan plan;
+  plan.start = supply.sweep_start;
+  plan.end = supply.sweep_end;
+  plan.speed_rad_s = supply.sweep_speed_rad_s;
+  plan.positioning_speed_rad_s =
+      std::max(plan.speed_rad_s, kPositioningShare * (module_ ? module_->velocity_max_rad_s : 0.0));
+  plan.pivot_latency = data_->config.pivot_latency;
+  plan.scanner_latency = data_->config.scanner_latency;
+  sweep_.begin(plan, now);
+}
+
+void Cell::start_detection(TimePoint now) {
+  last_profile_at_ = now;
+  plc_.on_scan_done(now);
+  DetectRequest request;
+  request.cycle_id = cycle_id_;
+  request.image = builder_->image();
+  request.cell = data_;
+  request.supply = supply_;
+  request.recipe = recipe_;
+  BINPICK_LOG(Info, "cell", "cycle %llu: sweep of %.2f s, %zu profiles, %zu points; robot may enter",
+              static_cast<unsigned long long>(cycle_id_), in_s(sweep_done_.duration), sweep_done_.profiles,
+              builder_->points());
+  detect_request_ = std::move(request);
+}
+
+void Cell::publish(TimePoint now) {
+  const DetectResult result = std::move(*std::exchange(detect_result_, std::nullopt));
+  const auto& supply = data_->config.supplies[supply_];
+
+  plc::PickResult answer;
+  answer.part_id = request_.part_id;
+  answer.fill_level_percent = to_u16(100 * result.fill.share);
+  answer.figures.sweep_ms = to_u16(in_ms(sweep_done_.duration));
+  answer.figures.profiles = to_u16(static_cast<double>(sweep_done_.profiles));
+  answer.figures.points = static_cast<std::uint32_t>(builder_->points());
+  answer.figures.hypotheses = static_cast<std::uint32_t>(result.report.hypotheses);
+  answer.figures.detection_ms = to_u16(result.report.time_ms);
+
+  const std::size_t found = result.report.detections.size();
+  if (!result.choice.reachable.empty()) {
+    const auto& grasp = result.choice.reachable.front();
+    pick_id_ = pick_id_ == 65535 ? 1 : static_cast<std::uint16_t>(pick_id_ + 1);
+    answer.code = plc::ResultCode::PickFound;
+    answer.pick_id = pick_id_;
+    answer.objects_left = to_u16(static_cast<double>(found - 1));
+    answer.score = result.report.detections[grasp.detection].score;
+    answer.T_base_approach = supply.T_base_supply * grasp.T_supply_approach;
+    answer.T_base_grasp = supply.T_base_supply * grasp.T_supply_grasp;
+    robot_.offer({answer.pick_id, request_.sequence, request_.part_id, answer.objects_left, answer.T_base_approach,
+                  answer.T_base_grasp});
+  } else {
+    answer.objects_left = to_u16(static_cast<double>(found));
+    answer.code = found > 0             ? plc::ResultCode::NotReachable
+                  : result.supply_empty ? plc::ResultCode::SupplyEmpty
+                                        : plc::ResultCode::NothingFound;
+    // The robot's codes for "no pick" are the PLC's result codes.
+    robot_.withdraw(static_cast<drivers::robot::NoPick>(answer.code));
+    for (const auto& unreachable : result.choice.unreachable)
+      BINPICK_LOG(Info, "cell", "object %zu is not reachable: %s", unreachable.detection, unreachable.reason.c_str());
+  }
+  plc_.publish(answer, now);
+  BINPICK_LOG(
+      Info, "cell",
+      "cycle %llu: result %u, pick %u, %zu found, score %.2f, %zu hypotheses, detection %.0f ms, last profile to "
+      "answer %.0f ms",
+      static_cast<unsigned long long>(cycle_id_), static_cast<unsigned>(answer.code), answer.pick_id, found,
+      answer.score, result.report.hypotheses, result.report.time_ms, in_ms(now - last_profile_at_));
+}
+
+void Cell::stop_cycle(TimePoint now) {
+  sweep_.abort(now);
+  if (pivot_.state() == drivers::pivot::Session::State::Moving) pivot_.stop(now);
+  detect_request_.reset();
+  detect_result_.reset();
+  robot_.withdraw(drivers::robot::NoPick::Fault);
+}
+
+void Cell::device_failed(plc::Alarm alarm, const std::string& text, TimePoint now) {
+  BINPICK_LOG(Warning, "cell", "%s", text.c_str());
+  cycle_alarm_ = alarm;
+  plc_.raise(alarm, now);
+  apply(CellInput::DeviceLost, now);
+}
+
+void Cell::alarm_off(std::optional<plc::Alarm>& standing, TimePoint now) {
+  if (standing) plc_.clear(*standing, now);
+  standing.reset();
+}
+
+void Cell::on(const plc::Event& event, TimePoint now) {
+  std::visit(Overloaded{
+                 [&](const plc::RequestAccepted& accepted) {
+                   const auto& config = data_->config;
+                   request_ = accepted.request;
+                   const auto recipe = std::ranges::find(config.recipes, request_.part_id, &config::Recipe::id);
+                   const auto supply = std::ranges::find(config.supplies, request_.supply_id, &config::Supply::id);
+                   BINPICK_CHECK(recipe != config.recipes.end() && supply != config.supplies.end());
+                   recipe_ = static_cast<std::size_t>(recipe - config.recipes.begin());
+                   supply_ = static_cast<std::size_t>(supply - config.supplies.begin());
+                   ++cycle_id_;
+                   request_at_ = now;
+                   robot_.withdraw(drivers::robot::NoPick::NotReady);
+                   BINPICK_LOG(Info, "cell", "cycle %llu: request %u for part %u in supply %u",
+                               static_cast<unsigned long long>(cycle_id_), request_.sequence, request_.part_id,
+                               request_.supply_id);
+                   apply(CellInput::Request, now);
+                   if (plc_.robot_clear()) {
+                     apply(CellInput::RobotClear, now);
+                   } else {
+                     BINPICK_LOG(Info, "cell", "cycle %llu waits: the robot is not clear of the view",
+                                 static_cast<unsigned long long>(cycle_id_));
+                   }
+                 },
+                 [&](const plc::CycleAborted&) {
+                   BINPICK_LOG(Notice, "cell", "cycle %llu aborted by the PLC",
+                               static_cast<unsigned long long>(cycle_id_));
+                   apply(CellInput::Cancelled, now);
+                 },
+                 [&](const plc::CycleTimedOut&) {
+                   BINPICK_LOG(Warning, "cell", "cycle %llu took too long and is given up",
+                               static_cast<unsigned long long>(cycle_id_));
+                   apply(CellInput::Cancelled, now);
+                 },
+                 [&](const plc::ResetRaised&) { BINPICK_LOG(Notice, "cell", "reset by the PLC"); },
+                 [&](const plc::ResultAcknowledged&) {},
+                 [&](const plc::RobotClearChanged& changed) {
+                   if (!changed.clear) cycle_alarm_ = plc::Alarm::RobotNotClear;
+                   apply(changed.clear ? CellInput::RobotClear : CellInput::RobotEntered, now);
+                 },
+                 [&](const plc::PlcLost&) {
+                   BINPICK_LOG(Warning, "plc", "the PLC is gone; check its program and the network");
+                   if (state_ == CellState::Idle) return;
+                   stop_cycle(now);
+                   state_ = CellState::Idle;
+                   plc_.fault(plc::Alarm::PlcLost, now);
+                 },
+                 [&](const plc::PlcBack&) { BINPICK_LOG(Notice, "plc", "the PLC is there"); },
+             },
+             event);
+}
+
+void Cell::on(const drivers::pivot::Event& event, TimePoint now) {
+  if (const auto* ready = std::get_if<drivers::pivot::Ready>(&event)) {
+    module_ = ready->module;
+    BINPICK_LOG(Notice, "pivot", "ready: module %u, firmware %04x, serial %u, %.1f … %.1f deg, %.1f deg/s at most",
+                data_->config.pivot.module_id, module_->firmware, module_->serial, module_->position_min.in_deg(),
+                module_->position_max.in_deg(), Angle::rad(module_->velocity_max_rad_s).in_deg());
+    alarm_off(pivot_alarm_, now);
+  }
+  sweep_.on_pivot(event, now);
+  if (const auto* failed = std::get_if<drivers::pivot::Failed>(&event)) {
+    if (pivot_alarm_ && *pivot_alarm_ != alarm_of(*failed)) alarm_off(pivot_alarm_, now);
+    pivot_alarm_ = alarm_of(*failed);
+    device_failed(*pivot_alarm_, "pivot: " + failed->text, now);
+  }
+}
+
+void Cell::on(const drivers::lms400::Event& event, TimePoint now) {
+  if (const auto* ready = std::get_if<drivers::lms400::Ready>(&event)) {
+    BINPICK_LOG(Notice, "scanner", "ready: %.0f Hz, %.3f deg", ready->frequency_hz, ready->resolution.in_deg());
+    alarm_off(scanner_alarm_, now);
+  }
+  sweep_.on_scanner(event, now);
+  if (const auto* failed = std::get_if<drivers::lms400::Failed>(&event)) {
+    if (scanner_alarm_ && *scanner_alarm_ != alarm_of(*failed)) alarm_off(scanner_alarm_, now);
+    scanner_alarm_ = alarm_of(*failed);
+    device_failed(*scanner_alarm_, "scanner: " + failed->text, now);
+  }
+}
+
+void Cell::on(const drivers::robot::Event& event, TimePoint now) {
+  std::visit(Overloaded{
+                 [&](const drivers::robot::Connected&) {
+                   BINPICK_LOG(Notice, "robot", "connected");
+                   if (robot_lost_) plc_.clear(plc::Alarm::RobotLost, now);
+                   robot_lost_ = false;
+                 },
+                 [&](const drivers::robot::Fetched& fetched) {
+                   BINPICK_LOG(Info, "robot", "pick %u fetched", fetched.pick_id);
+                 },
+                 [&](const drivers::robot::Reported& reported) {
+                   BINPICK_LOG(Info, "robot", "pick %u %s", reported.pick_id, reported.done ? "done" : "failed");
+                   robot_.withdraw(drivers::robot::NoPick::NotReady);
+                 },
+                 [&](const drivers::robot::Lost& lost) {
+                   BINPICK_LOG(Warning, "robot", "lost: %s; start the robot's program and check the network",
+                               lost.text.c_str());
+                   robot_lost_ = true;
+                   plc_.raise(plc::Alarm::RobotLost, now);
+                 },
+             },
+             event);
+}
+
+void Cell::on(drivers::sweep::Event& event, TimePoint now) {
+  std::visit(Overloaded{
+                 [&](const drivers::sweep::RegisteredProfile& registered) {
+                   if (state_ != CellState::Sweeping) return;
+                   const auto& config = data_->config;
+                   const auto T_base_scanner = vision::scanner_at(config.mount, registered.pivot);
+                   const auto T_supply_scanner = config.supplies[supply_].T_base_supply.inverse() * T_base_scanner;
+                   points_supply_mm_.clear();
+                   vision::register_profile(registered.profile.range_mm, registered.profile.first,
+                                            registered.profile.step, T_supply_scanner, points_supply_mm_);
+                   builder_->add(points_supply_mm_);
+                 },
+                 [&](const drivers::sweep::Done& done) {
+                   sweep_done_ = done;
+                   if (done.profiles_lost > 0)
+                     BINPICK_LOG(Warning, "scanner", "%llu profiles lost in the sweep",
+                                 static_cast<unsigned long long>(done.profiles_lost));
+                   apply(CellInput::SweepDone, now);
+                 },
+                 [&](const drivers::sweep::Failed& failed) {
+                   using Device = drivers::sweep::Failed::Device;
+                   cycle_alarm_ = failed.device == Device::Pivot ? pivot_alarm_.value_or(plc::Alarm::PivotModuleError)
+                                  : failed.device == Device::Scanner
+                                      ? scanner_alarm_.value_or(plc::Alarm::ScannerNoReply)
+                                      : plc::Alarm::ScanTimeout;
+                   BINPICK_LOG(Warning, "cell", "cycle %llu: sweep failed: %s",
+                               static_cast<unsigned long long>(cycle_id_), failed.text.c_str());
+                   apply(CellInput::SweepFailed, now);
+                 },
+             },
+             event);
+}
+}  // namespace binpick::daemon

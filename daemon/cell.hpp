@@ -1,0 +1,99 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/clock.hpp"
+#include "daemon/cell_data.hpp"
+#include "daemon/detection.hpp"
+#include "daemon/sequence.hpp"
+#include "drivers/pivot/session.hpp"
+#include "drivers/robot/session.hpp"
+#include "drivers/scanner/lms400/session.hpp"
+#include "drivers/sweep/sweep.hpp"
+#include "plc/session.hpp"
+#include "vision/depth_image.hpp"
+
+namespace binpick::daemon {
+/// The cell: the four sessions, wired together. No I/O, no clock: the daemon pumps it on sockets, tests in memory and
+/// virtual time. After any call into one of its sessions, and at its deadline, call run(now).
+class Cell {
+ public:
+  Cell(std::shared_ptr<const CellData> data, std::uint16_t boot_count);
+
+  plc::Session& plc() { return plc_; }
+  drivers::pivot::Session& pivot() { return pivot_; }
+  drivers::lms400::Session& scanner() { return scanner_; }
+  drivers::robot::Session& robot() { return robot_; }
+
+  /// Serves deadlines that have come, drains every session's events and moves the cycle on, until nothing happens any
+  /// more.
+  void run(TimePoint now);
+  std::optional<TimePoint> deadline() const;
+
+  /// The scan to look through, once per cycle, when its last profile is in.
+  std::optional<DetectRequest> take_detect_request();
+  void on_detect_result(DetectResult result, TimePoint now);
+
+  /// New configuration; in force at once when no cycle runs, else after it. What only a restart can change keeps its
+  /// old value and is named in the log and by an alarm.
+  void reload(std::shared_ptr<const CellData> data, TimePoint now);
+  /// A reload was refused: alarm and log, the old configuration stays in force.
+  void reload_refused(const std::vector<std::string>& findings, TimePoint now);
+  const CellData& data() const { return *data_; }
+
+  /// Ends the cycle, stops the pivot, withdraws everything valid. Nothing is accepted any more.
+  void shut_down(TimePoint now);
+  /// After shut_down: the pivot stands (or is not there), nothing valid is left.
+  bool safe() const;
+
+  CellState state() const { return state_; }
+  std::uint64_t cycles() const { return cycle_id_; }
+
+ private:
+  bool drain(TimePoint now);
+  void apply(CellInput input, TimePoint now);
+  void begin_sweep(TimePoint now);
+  void start_detection(TimePoint now);
+  void publish(TimePoint now);
+  void stop_cycle(TimePoint now);
+  void put_in_force(TimePoint now);
+  void update_ready(TimePoint now);
+  void device_failed(plc::Alarm alarm, const std::string& text, TimePoint now);
+  void alarm_off(std::optional<plc::Alarm>& standing, TimePoint now);
+
+  void on(const plc::Event& event, TimePoint now);
+  void on(const drivers::pivot::Event& event, TimePoint now);
+  void on(const drivers::lms400::Event& event, TimePoint now);
+  void on(const drivers::robot::Event& event, TimePoint now);
+  void on(drivers::sweep::Event& event, TimePoint now);
+
+  std::shared_ptr<const CellData> data_;
+  std::shared_ptr<const CellData> edited_;  // in force after the running cycle
+  plc::Session plc_;
+  drivers::pivot::Session pivot_;
+  drivers::lms400::Session scanner_;
+  drivers::robot::Session robot_;
+  drivers::sweep::Sweep sweep_;
+
+  CellState state_ = CellState::Idle;
+  bool stopping_ = false;
+  bool robot_lost_ = false;
+  std::optional<plc::Alarm> pivot_alarm_, scanner_alarm_;  // standing, cleared when the device is ready again
+  std::uint64_t cycle_id_ = 0;
+  std::uint16_t pick_id_ = 0;
+  plc::Alarm cycle_alarm_ = plc::Alarm::None;  // why FaultCycle
+  plc::PickRequest request_;
+  std::size_t supply_ = 0, recipe_ = 0;  // indices of the running request
+  std::optional<drivers::pivot::ModuleInfo> module_;
+  std::optional<vision::DepthImageBuilder> builder_;
+  std::vector<Eigen::Vector3f> points_supply_mm_;  // reused from profile to profile
+  drivers::sweep::Done sweep_done_;
+  TimePoint request_at_, last_profile_at_;
+  std::optional<DetectRequest> detect_request_;
+  std::optional<DetectResult> detect_result_;
+};
+}  // namespace binpick::daemon

@@ -1,0 +1,25 @@
+#include "daemon/cell_data.hpp"
+
+namespace binpick::daemon {
+Expected<std::shared_ptr<const CellData>, std::vector<std::string>> load_cell(const std::string& path) {
+  auto config = config::load(path);
+  std::vector<std::string> findings;
+  if (!config) {
+    for (const auto& diagnostic : config.error()) findings.push_back(to_string(diagnostic));
+    return unexpected(std::move(findings));
+  }
+  auto cell = std::make_shared<CellData>();
+  cell->config = std::move(*config);
+  for (const auto& recipe : cell->config.recipes) {
+    auto knowledge = vision::KnowledgeBase::open(recipe.knowledge_base);
+    if (!knowledge) {
+      findings.push_back(path + ": part " + std::to_string(recipe.id) + ": " + knowledge.error().text +
+                         " (make it with: binpick train " + recipe.part.path + " -o " + recipe.knowledge_base + ")");
+      continue;
+    }
+    cell->knowledge_bases.push_back(std::move(*knowledge));
+  }
+  if (!findings.empty()) return unexpected(std::move(findings));
+  return std::shared_ptr<const CellData>{std::move(cell)};
+}
+}  // namespace binpick::daemon

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/expected.hpp"
+#include "config/config.hpp"
+#include "vision/knowledge_base.hpp"
+
+namespace binpick::daemon {
+/// Everything the cell works from and never changes: the cell file and the knowledge bases of its recipes. A reload
+/// makes a new one and exchanges it between two cycles.
+struct CellData {
+  config::Config config;
+  std::vector<vision::KnowledgeBase> knowledge_bases;  ///< One per recipe, same order.
+};
+
+/// Reads the cell file, its part files and knowledge bases. The error is every finding as a text to print.
+Expected<std::shared_ptr<const CellData>, std::vector<std::string>> load_cell(const std::string& path);
+}  // namespace binpick::daemon

@@ -1,0 +1,53 @@
+#include "daemon/detection.hpp"
+
+#include <algorithm>
+#include <exception>
+
+namespace binpick::daemon {
+namespace {
+/// Less than this share of a part's smallest possible footprint (a square of a tenth of its diameter) is no part.
+double smallest_footprint_mm2(const vision::KnowledgeBase& part) {
+  const double edge_mm = 0.1 * part.diameter_mm();
+  return edge_mm * edge_mm;
+}
+
+DetectResult look(const DetectRequest& request) {
+  const auto& config = request.cell->config;
+  const auto& supply = config.supplies.at(request.supply);
+  const auto& recipe = config.recipes.at(request.recipe);
+  const auto& part = request.cell->knowledge_bases.at(request.recipe);
+  const vision::SupplyBox box{supply.size_mm};
+
+  vision::DetectorOptions options;
+  options.threads = config.detection.threads;
+  options.deadline = config.detection.deadline;
+
+  DetectResult result;
+  result.report = vision::detect(request.image, box, part, options);
+  auto& detections = result.report.detections;
+  std::erase_if(detections, [&](const vision::Detection& d) { return d.score < recipe.score_min; });
+
+  vision::ReachLimits limits = config.reach;
+  if (recipe.tilt_max_rad) limits.tilt_max_rad = *recipe.tilt_max_rad;
+  result.choice = vision::choose_grasps(result.report, part.symmetry(), recipe.part.grasps, box, limits);
+
+  result.fill = vision::fill_level(request.image, box, part.noise_mm());
+  result.supply_empty =
+      detections.empty() && result.fill.measured > 0.3 && result.fill.occupied_mm2 < smallest_footprint_mm2(part);
+  return result;
+}
+}  // namespace
+
+DetectResult run_detection(const DetectRequest& request) noexcept {
+  DetectResult result;
+  try {
+    result = look(request);
+  } catch (const std::exception& failure) {
+    result.error = failure.what();
+  } catch (...) {
+    result.error = "an unknown exception";
+  }
+  result.cycle_id = request.cycle_id;
+  return result;
+}
+}  // namespace binpick::daemon

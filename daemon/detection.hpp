@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "daemon/cell_data.hpp"
+#include "vision/depth_image.hpp"
+#include "vision/detector.hpp"
+#include "vision/fill_level.hpp"
+#include "vision/grasp.hpp"
+
+namespace binpick::daemon {
+/// One scan to look through. Owns all it names: it is moved to the vision worker.
+struct DetectRequest {
+  std::uint64_t cycle_id = 0;
+  vision::DepthImage image;
+  std::shared_ptr<const CellData> cell;
+  std::size_t supply = 0;  ///< Index into the configuration's supplies.
+  std::size_t recipe = 0;  ///< Index into its recipes.
+};
+
+struct DetectResult {
+  std::uint64_t cycle_id = 0;      ///< A result of an abandoned cycle is dropped by it.
+  vision::DetectionReport report;  ///< Only detections that reach the recipe's score_min stay in `detections`.
+  vision::GraspChoice choice;
+  vision::FillLevel fill;
+  bool supply_empty = false;  ///< Nothing lies in the supply that could be a part.
+  std::string error;          ///< Not empty: detection itself failed; nothing else is valid.
+};
+
+/// The whole of a cycle's vision, from depth image to reachable grasps. Pure; long; called by the vision worker.
+/// What a library throws becomes `error`.
+DetectResult run_detection(const DetectRequest& request) noexcept;
+}  // namespace binpick::daemon

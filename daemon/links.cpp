@@ -1,0 +1,111 @@
+#include "daemon/links.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "base/log.hpp"
+
+namespace binpick::daemon {
+namespace link = drivers::link;
+namespace {
+link::Endpoint endpoint(const std::string& text, const char* key) {
+  auto parsed = link::parse_endpoint(text);
+  if (!parsed) throw std::runtime_error(std::string(key) + ": " + parsed.error());
+  return *parsed;
+}
+
+link::ServerPeer plc_peer(Cell& cell) {
+  return {
+      .on_accept = [&cell](link::ConnectionId id, const std::string& address, std::uint16_t port,
+                           TimePoint now) { return cell.plc().on_accept(id, address, port, now); },
+      .on_bytes = [&cell](link::ConnectionId id, ByteView bytes,
+                          TimePoint now) { cell.plc().on_bytes(id, bytes, now); },
+      .on_closed = [&cell](link::ConnectionId id, TimePoint now) { cell.plc().on_closed(id, now); },
+      .take_output = [&cell](link::ConnectionId id) { return cell.plc().take_output(id); },
+      .wants_close = [&cell](link::ConnectionId id) { return cell.plc().wants_close(id); },
+  };
+}
+
+std::unique_ptr<link::CanLink> open_pivot(link::Loop& loop, Cell& cell) {
+  const auto& config = cell.data().config;
+  const std::uint32_t module = config.pivot.module_id;
+  return link::open_can(
+      loop, config.pivot_can, {{0x0A0 + module, 0x7FF}, {0x060 + module, 0x7FF}},
+      {
+          .on_up = [&cell](TimePoint now) { cell.pivot().on_link_up(now); },
+          .on_frame = [&cell](const link::CanFrame& frame, TimePoint at) { cell.pivot().on_frame(frame, at); },
+          .on_down = [&cell](const std::string& why, TimePoint now) { cell.pivot().on_link_down(why, now); },
+          .take_frames = [&cell] { return cell.pivot().take_frames(); },
+      },
+      config.pivot_can_listen_port);
+}
+
+link::StreamPeer scanner_peer(Cell& cell) {
+  return {
+      .on_connected = [&cell](TimePoint now) { cell.scanner().on_connected(now); },
+      .on_bytes = [&cell](ByteView bytes, TimePoint now) { cell.scanner().on_bytes(bytes, now); },
+      .on_disconnected = [&cell](TimePoint now) { cell.scanner().on_disconnected(now); },
+      .take_output = [&cell] { return cell.scanner().take_output(); },
+  };
+}
+
+bool allowed(const std::vector<std::string>& allow, const std::string& address) {
+  return address == "127.0.0.1" || address == "::1" || std::ranges::find(allow, address) != allow.end();
+}
+}  // namespace
+
+Links::Links(link::Loop& loop, Cell& cell)
+    : cell_{cell},
+      plc_{loop, endpoint(cell.data().config.plc_listen, "plc.listen"), plc_peer(cell)},
+      pivot_{open_pivot(loop, cell)},
+      scanner_{loop, endpoint(cell.data().config.scanner_address, "scanner.address"), scanner_peer(cell)} {
+  if (cell.data().config.robot_listen.empty()) return;  // the PLC forwards the movement
+  robot_.emplace(
+      loop, endpoint(cell.data().config.robot_listen, "robot.listen"),
+      link::ServerPeer{
+          .on_accept =
+              [this](link::ConnectionId id, const std::string& address, std::uint16_t, TimePoint now) {
+                if (!allowed(cell_.data().config.robot_allow, address)) {
+                  BINPICK_LOG(Warning, "robot", "%s refused: not in robot.allow", address.c_str());
+                  return false;
+                }
+                // A robot that lost power never closed its old connection: the new one replaces it.
+                if (robot_connection_ != 0) cell_.robot().on_disconnected(now);
+                robot_connection_ = id;
+                cell_.robot().on_connected(now);
+                return true;
+              },
+          .on_bytes =
+              [this](link::ConnectionId id, ByteView bytes, TimePoint now) {
+                if (id == robot_connection_) cell_.robot().on_bytes(bytes, now);
+              },
+          .on_closed =
+              [this](link::ConnectionId id, TimePoint now) {
+                if (id != robot_connection_) return;
+                robot_connection_ = 0;
+                cell_.robot().on_disconnected(now);
+              },
+          .take_output =
+              [this](link::ConnectionId id) { return id == robot_connection_ ? cell_.robot().take_output() : Bytes{}; },
+          .wants_close = [this](link::ConnectionId id) { return id != robot_connection_; },
+      },
+      link::TcpServerOptions{.connections_max = 2, .newest_wins = true});
+}
+
+void Links::on_deadline(TimePoint now) {
+  const auto due = [&](std::optional<TimePoint> at) { return at && *at <= now; };
+  if (due(pivot_->deadline())) pivot_->on_deadline(now);
+  if (due(scanner_.deadline())) scanner_.on_deadline(now);
+}
+
+std::optional<TimePoint> Links::deadline() const { return earlier(pivot_->deadline(), scanner_.deadline()); }
+
+void Links::flush(TimePoint now) {
+  if (cell_.scanner().take_reopen()) scanner_.reopen(now);
+  if (robot_ && cell_.robot().take_reopen() && robot_connection_ != 0) robot_->close(robot_connection_, now);
+  pivot_->flush(now);
+  scanner_.flush(now);
+  plc_.flush(now);
+  if (robot_) robot_->flush(now);
+}
+}  // namespace binpick::daemon

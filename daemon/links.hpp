@@ -1,0 +1,31 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "base/clock.hpp"
+#include "daemon/cell.hpp"
+#include "drivers/link/can.hpp"
+#include "drivers/link/loop.hpp"
+#include "drivers/link/tcp.hpp"
+
+namespace binpick::daemon {
+/// The cell's sessions on their sockets: what EmulatedCell does in memory, done by descriptors.
+class Links {
+ public:
+  /// Throws std::runtime_error when an address cannot be listened on.
+  Links(drivers::link::Loop& loop, Cell& cell);
+
+  void on_deadline(TimePoint now);  ///< Links' own timers: connecting, retries.
+  std::optional<TimePoint> deadline() const;
+  void flush(TimePoint now);  ///< After Cell::run: sends what the sessions have to say.
+
+ private:
+  Cell& cell_;
+  drivers::link::TcpServer plc_;
+  std::unique_ptr<drivers::link::CanLink> pivot_;
+  drivers::link::TcpClient scanner_;
+  std::optional<drivers::link::TcpServer> robot_;
+  drivers::link::ConnectionId robot_connection_ = 0;  // the one that counts; 0: none
+};
+}  // namespace binpick::daemon

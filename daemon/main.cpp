@@ -1,0 +1,189 @@
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <future>
+#include <signal.h>
+#include <string>
+#include <sys/epoll.h>
+#include <sys/signalfd.h>
+#include <systemd/sd-daemon.h>
+#include <unistd.h>
+
+#include "base/clock.hpp"
+#include "base/log.hpp"
+#include "daemon/boot_count.hpp"
+#include "daemon/cell.hpp"
+#include "daemon/links.hpp"
+#include "daemon/vision_worker.hpp"
+#include "drivers/link/loop.hpp"
+
+/// binpickd: one loop, one vision worker. Read top to bottom: options, configuration, cell, loop, stop.
+namespace binpick::daemon {
+namespace {
+constexpr int kExitConfig = 78;                                 // EX_CONFIG: systemd does not try again
+constexpr Duration kStopMax = std::chrono::milliseconds(1500);  // SIGTERM to exit, well inside the promised 2 s
+constexpr Duration kDetectionHangs = std::chrono::seconds(20);  // no detection and no picture takes this long
+
+using Loaded = Expected<std::shared_ptr<const CellData>, std::vector<std::string>>;
+
+/// A reload reads files and verifies knowledge bases: that is too long for the loop, so a thread of its own does it.
+class Reloader {
+ public:
+  explicit Reloader(drivers::link::Loop& loop) : loop_{loop} {}
+  void start(const std::string& path) {
+    if (running_.valid()) {
+      again_ = true;  // an edit during a reload: read once more after it
+      return;
+    }
+    running_ = std::async(std::launch::async, [this, path] {
+      auto loaded = load_cell(path);
+      loop_.wake();
+      return loaded;
+    });
+  }
+  std::optional<Loaded> take(const std::string& path) {
+    if (!running_.valid() || running_.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
+      return std::nullopt;
+    auto loaded = running_.get();
+    if (std::exchange(again_, false)) start(path);
+    return loaded;
+  }
+  bool pending() const { return running_.valid(); }
+
+ private:
+  drivers::link::Loop& loop_;
+  std::future<Loaded> running_;
+  bool again_ = false;
+};
+
+/// SIGTERM, SIGINT and SIGHUP as readable events. Blocked before any thread starts, so that all threads inherit it.
+int open_signals() {
+  sigset_t set;
+  sigemptyset(&set);
+  for (const int number : {SIGTERM, SIGINT, SIGHUP}) sigaddset(&set, number);
+  pthread_sigmask(SIG_BLOCK, &set, nullptr);
+  signal(SIGPIPE, SIG_IGN);
+  return signalfd(-1, &set, SFD_NONBLOCK | SFD_CLOEXEC);
+}
+
+/// Fed only while the loop turns and the worker makes progress.
+class Watchdog {
+ public:
+  Watchdog() {
+    std::uint64_t us = 0;
+    if (sd_watchdog_enabled(0, &us) > 0) period_ = std::chrono::microseconds(us) / 3;
+  }
+  std::optional<TimePoint> deadline() const { return period_ ? std::optional{next_} : std::nullopt; }
+  void turn(const VisionWorker& worker, TimePoint now) {
+    if (worker.progress() != progress_ || !worker.busy()) {
+      progress_ = worker.progress();
+      progress_at_ = now;
+    }
+    if (!period_ || now < next_) return;
+    next_ = now + *period_;
+    if (now - progress_at_ < kDetectionHangs) sd_notify(0, "WATCHDOG=1");
+  }
+
+ private:
+  std::optional<Duration> period_;
+  TimePoint next_{};
+  std::uint64_t progress_ = 0;
+  TimePoint progress_at_{};
+};
+
+int run(const std::string& path) {
+  const int signals = open_signals();
+  auto loaded = load_cell(path);
+  if (!loaded) {
+    for (const auto& finding : loaded.error()) std::fprintf(stderr, "%s\n", finding.c_str());
+    BINPICK_LOG(Error, "config", "%s refused with %zu findings; see them with: binpick check %s", path.c_str(),
+                loaded.error().size(), path.c_str());
+    return kExitConfig;
+  }
+  const SystemClock clock;
+  Cell cell{*loaded, next_boot_count((*loaded)->config.state_dir)};
+  drivers::link::Loop loop;
+  Links links{loop, cell};
+  VisionWorker worker{[&loop] { loop.wake(); }};
+  Reloader reloader{loop};
+  Watchdog watchdog;
+  std::optional<TimePoint> stop_by;
+
+  loop.watch(signals, EPOLLIN, [&](std::uint32_t, TimePoint now) {
+    signalfd_siginfo info{};
+    while (read(signals, &info, sizeof info) == static_cast<ssize_t>(sizeof info)) {
+      if (info.ssi_signo == SIGHUP) {
+        sd_notifyf(0, "RELOADING=1\nSTATUS=reading %s", path.c_str());
+        reloader.start(path);
+      } else if (!stop_by) {
+        BINPICK_LOG(Notice, "daemon", "stopping");
+        sd_notify(0, "STOPPING=1");
+        stop_by = now + kStopMax;
+        cell.shut_down(now);
+      }
+    }
+  });
+  BINPICK_LOG(Notice, "daemon", "%s is up: PLC at %s, pivot %s, scanner %s, robot at %s",
+              (*loaded)->config.name.c_str(), (*loaded)->config.plc_listen.c_str(), (*loaded)->config.pivot_can.c_str(),
+              (*loaded)->config.scanner_address.c_str(), (*loaded)->config.robot_listen.c_str());
+  sd_notify(0, "READY=1\nSTATUS=running");
+
+  TimePoint now = clock.now();
+  while (true) {
+    links.on_deadline(now);
+    if (auto result = worker.take_result()) cell.on_detect_result(std::move(*result), now);
+    if (auto edited = reloader.take(path)) {
+      if (*edited) {
+        cell.reload(std::move(**edited), now);
+      } else {
+        cell.reload_refused(edited->error(), now);
+      }
+      sd_notify(0, "READY=1\nSTATUS=running");
+    }
+    cell.run(now);
+    if (auto request = cell.take_detect_request()) {
+      const auto cycle = request->cycle_id;
+      if (!worker.post(std::move(*request))) {
+        DetectResult failed;
+        failed.cycle_id = cycle;
+        failed.error = "the worker is still at an earlier scan";
+        cell.on_detect_result(std::move(failed), now);
+        cell.run(now);
+      }
+    }
+    links.flush(now);
+    watchdog.turn(worker, now);
+    if (stop_by && (cell.safe() || now >= *stop_by)) break;
+    now = loop.wait(earlier(earlier(cell.deadline(), links.deadline()), earlier(watchdog.deadline(), stop_by)));
+  }
+  links.flush(clock.now());
+  BINPICK_LOG(Notice, "daemon", "stopped%s", cell.safe() ? "" : ", but the pivot did not answer");
+  if (worker.busy()) {
+    // A detection cannot be broken off; nobody waits for this one any more.
+    std::fflush(nullptr);
+    _exit(0);
+  }
+  return 0;
+}
+}  // namespace
+}  // namespace binpick::daemon
+
+int main(int argc, char** argv) {
+  CLI::App app{"binpickd: the cell controller of a bin-picking cell"};
+  app.set_version_flag("--version", std::string{BINPICK_VERSION});
+  std::string path;
+  bool verbose = false;
+  app.add_option("--config", path, "cell file (TOML)")->required();
+  app.add_flag("--verbose", verbose, "log debug lines too");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  if (verbose) binpick::log::set_threshold(binpick::log::Level::Debug);
+  try {
+    return binpick::daemon::run(path);
+  } catch (const std::exception& failure) {
+    BINPICK_LOG(Error, "daemon", "cannot start: %s", failure.what());
+    return 1;
+  }
+}

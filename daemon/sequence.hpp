@@ -1,0 +1,66 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+
+/// One cycle of the cell as a table: what happens between the PLC's accepted request and its answer.
+namespace binpick::daemon {
+enum class CellState {
+  Idle,
+  AwaitingClear,  ///< The robot stands in the view.
+  Sweeping,
+  Detecting,
+};
+enum class CellInput {
+  Request,       ///< The PLC's request was accepted.
+  RobotClear,    ///< The robot is out of the view.
+  RobotEntered,  ///< The robot came into the view.
+  SweepDone,
+  SweepFailed,
+  DetectionDone,
+  DetectionFailed,
+  DeviceLost,  ///< Pivot or scanner, outside a sweep.
+  Cancelled,   ///< Abort or time-out by the handshake, PLC gone, or the daemon stops.
+};
+enum class CellEffect {
+  None,
+  BeginSweep,
+  StartDetection,
+  Publish,      ///< Result to the PLC, pick to the robot.
+  FaultCycle,   ///< Stop what moves, nothing valid, alarm; the PLC has to reset.
+  StopQuietly,  ///< Stop what moves, nothing valid; whoever asked for it knows.
+};
+struct CellRow {
+  CellState from;
+  CellInput on;
+  CellState to;
+  CellEffect effect;
+};
+
+inline constexpr std::array kCellRows{
+    CellRow{CellState::Idle, CellInput::Request, CellState::AwaitingClear, CellEffect::None},
+    CellRow{CellState::AwaitingClear, CellInput::RobotClear, CellState::Sweeping, CellEffect::BeginSweep},
+    CellRow{CellState::AwaitingClear, CellInput::DeviceLost, CellState::Idle, CellEffect::FaultCycle},
+    CellRow{CellState::AwaitingClear, CellInput::Cancelled, CellState::Idle, CellEffect::StopQuietly},
+    CellRow{CellState::Sweeping, CellInput::SweepDone, CellState::Detecting, CellEffect::StartDetection},
+    CellRow{CellState::Sweeping, CellInput::SweepFailed, CellState::Idle, CellEffect::FaultCycle},
+    CellRow{CellState::Sweeping, CellInput::RobotEntered, CellState::Idle, CellEffect::FaultCycle},
+    CellRow{CellState::Sweeping, CellInput::Cancelled, CellState::Idle, CellEffect::StopQuietly},
+    CellRow{CellState::Detecting, CellInput::DetectionDone, CellState::Idle, CellEffect::Publish},
+    CellRow{CellState::Detecting, CellInput::DetectionFailed, CellState::Idle, CellEffect::FaultCycle},
+    // A scan whose devices failed right after it is not trusted: an emergency stop, most often.
+    CellRow{CellState::Detecting, CellInput::DeviceLost, CellState::Idle, CellEffect::FaultCycle},
+    CellRow{CellState::Detecting, CellInput::Cancelled, CellState::Idle, CellEffect::StopQuietly},
+};
+
+/// nullptr: the input means nothing in this state and changes nothing.
+constexpr const CellRow* find_cell_row(CellState from, CellInput on) {
+  for (const CellRow& row : kCellRows)
+    if (row.from == from && row.on == on) return &row;
+  return nullptr;
+}
+
+static_assert(std::ranges::all_of(kCellRows,
+                                  [](const CellRow& row) { return find_cell_row(row.from, row.on) == &row; }),
+              "no two rows for the same state and input");
+}  // namespace binpick::daemon

@@ -1,0 +1,53 @@
+#include "daemon/vision_worker.hpp"
+
+#include <cstdio>
+#include <exception>
+#include <string>
+
+#include "base/log.hpp"
+#include "vision/draw.hpp"
+
+namespace binpick::daemon {
+namespace {
+/// Pictures are numbered by cycle; a picture that cannot be made never costs a cycle.
+void draw(const DetectRequest& request, const DetectResult& result) noexcept {
+  const auto& dir = request.cell->config.picture_dir;
+  if (dir.empty() || !result.error.empty()) return;
+  try {
+    char name[32];
+    std::snprintf(name, sizeof name, "/cycle-%06llu.png", static_cast<unsigned long long>(request.cycle_id));
+    const auto* chosen = result.choice.reachable.empty() ? nullptr : &result.choice.reachable.front();
+    const auto drawn = vision::draw_report(dir + name, request.image, request.cell->knowledge_bases[request.recipe],
+                                           result.report, chosen);
+    if (!drawn) BINPICK_LOG(Warning, "vision", "no picture: %s", drawn.error().c_str());
+  } catch (const std::exception& failure) {
+    BINPICK_LOG(Warning, "vision", "no picture: %s", failure.what());
+  }
+}
+}  // namespace
+
+VisionWorker::VisionWorker(std::function<void()> wake_loop)
+    : wake_loop_{std::move(wake_loop)}, thread_{[this] { work(); }} {}
+
+VisionWorker::~VisionWorker() { requests_.close(); }
+
+bool VisionWorker::post(DetectRequest request) { return requests_.try_push(std::move(request)); }
+
+std::optional<DetectResult> VisionWorker::take_result() { return results_.try_pop(); }
+
+void VisionWorker::work() {
+  while (!requests_.closed()) {
+    auto request = requests_.pop_for(std::chrono::milliseconds(500));
+    ++progress_;
+    if (!request) continue;
+    busy_ = true;
+    DetectResult result = run_detection(*request);
+    DetectResult to_draw = result;
+    // The loop takes results faster than detections are made; a full box means that nobody listens any more.
+    if (!results_.try_push(std::move(result))) BINPICK_LOG(Error, "vision", "a result found no taker");
+    wake_loop_();
+    draw(*request, to_draw);
+    busy_ = false;
+  }
+}
+}  // namespace binpick::daemon
