@@ -1,11 +1,12 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "base/bytes.hpp"
 #include "base/clock.hpp"
@@ -22,7 +23,11 @@ std::string to_string(const Endpoint& endpoint);
 /// "host:port", "[v6]:port"; an error says what is wrong with the text.
 Expected<Endpoint, std::string> parse_endpoint(std::string_view text);
 
-/// A session's face as a client link pumps it.
+struct SocketAddress;
+class Resolver;
+
+/// A session's face as a client link pumps it. Output is taken after each call and by flush(). A callback may call
+/// reopen() or flush(), but must not destroy the link.
 struct StreamPeer {
   std::function<void(TimePoint)> on_connected;
   std::function<void(ByteView, TimePoint)> on_bytes;
@@ -35,10 +40,11 @@ struct TcpClientOptions {
   Duration retry_first =
       std::chrono::milliseconds(200);  ///< Doubles up to retry_max (a long back-off keeps a cell down).
   Duration retry_max = std::chrono::seconds(1);
+  std::size_t unsent_bytes_max = 1 << 20;  ///< A peer that does not read is dropped.
 };
 
 /// Connects, reconnects for ever with a capped back-off, moves bytes. TCP_NODELAY, keep-alive and TCP_USER_TIMEOUT are
-/// set.
+/// set: a peer that lost its power is noticed within about 3 s. A host name is resolved in a thread of its own.
 class TcpClient {
  public:
   TcpClient(Loop& loop, Endpoint endpoint, StreamPeer peer, TcpClientOptions options = {});
@@ -54,10 +60,14 @@ class TcpClient {
   std::string last_error() const;  ///< Why the last attempt failed, for the log ("connection refused").
 
  private:
-  enum class State { Waiting, Connecting, Connected };
+  enum class State { Waiting, Resolving, Connecting, Connected };
   void start(TimePoint now);
+  void on_resolved(TimePoint now);
+  void connect_to(const SocketAddress& address, TimePoint now);
+  void on_connect_done(TimePoint now);
   void drop(TimePoint now, const std::string& why);
   void on_event(std::uint32_t events, TimePoint now);
+  void receive(TimePoint now);
 
   Loop& loop_;
   Endpoint endpoint_;
@@ -67,15 +77,20 @@ class TcpClient {
   int fd_ = -1;
   Duration retry_;
   std::optional<TimePoint> deadline_ = TimePoint{};  // at once
+  std::size_t attempts_ = 0;                         // a name with several addresses is tried in turn
+  std::unique_ptr<Resolver> resolver_;
   Bytes unsent_;
+  bool wants_write_ = false;
   std::string last_error_;
 };
 
 using ConnectionId = std::uint32_t;
 
-/// A server's face. The link numbers connections from 1; a number is never used twice.
+/// A server's face. The link numbers connections from 1; a number is never used twice. Output is taken after each call
+/// and by flush(). A callback may call close() or flush(), but must not destroy the server.
 struct ServerPeer {
-  /// False closes the stranger at once. `address` is the numeric peer address, IPv4-mapped IPv6 already unmapped.
+  /// False closes the stranger at once, and on_closed is not called for it. `address` is the numeric peer address,
+  /// IPv4-mapped IPv6 already unmapped. With newest_wins, on_closed of the connection that had to give way follows.
   std::function<bool(ConnectionId, const std::string& address, std::uint16_t port, TimePoint)> on_accept;
   std::function<void(ConnectionId, ByteView, TimePoint)> on_bytes;
   std::function<void(ConnectionId, TimePoint)> on_closed;
@@ -98,7 +113,7 @@ class TcpServer {
   TcpServer& operator=(const TcpServer&) = delete;
 
   std::uint16_t port() const;  ///< The port really bound (listen on 0 to have one chosen).
-  void flush(TimePoint now);
+  void flush(TimePoint now);   ///< Sends what the session has to say; after a shortage of descriptors, listens again.
   void close(ConnectionId id, TimePoint now);
   std::size_t connections() const;
 
@@ -106,14 +121,23 @@ class TcpServer {
   struct Connection {
     int fd = -1;
     Bytes unsent;
+    bool wants_write = false;
   };
   void accept_all(TimePoint now);
+  bool accept_one(TimePoint now);
+  void refuse_one(TimePoint now);
   void on_event(ConnectionId id, std::uint32_t events, TimePoint now);
+  void receive(ConnectionId id, TimePoint now);
+  void flush(ConnectionId id, TimePoint now);
 
   Loop& loop_;
   ServerPeer peer_;
   TcpServerOptions options_;
   int listen_fd_ = -1;
+  int spare_fd_ = -1;  // given up when descriptors run out, so that a caller can be taken and turned away
+  std::optional<TimePoint> accept_paused_until_;
+  bool full_logged_ = false;
+  bool starved_logged_ = false;
   ConnectionId next_id_ = 1;
   std::map<ConnectionId, Connection> connections_;
 };
