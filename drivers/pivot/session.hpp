@@ -23,6 +23,7 @@ struct Options {
   std::chrono::milliseconds setpoint_horizon{
       200};  ///< While moving, the module knows no target further ahead than this.
   std::chrono::seconds reference_timeout{30};
+  bool identify_only = false;  ///< For probing: Ready is said without a reference run, and moves are refused.
 };
 
 /// What the module says of itself at start; limits are read, never assumed.
