@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
+#include <string_view>
 
 namespace binpick::plc {
 /// Alarm codes as the PLC reads them. Values never change. Cause and cure of each stand in alarm_table().
@@ -28,4 +30,16 @@ enum class Alarm : std::uint16_t {
   ConfigurationRefused = 700,  ///< A reload was refused; the old configuration is in force.
   ConfigurationNeedsRestart = 701,
 };
+
+/// One line of the alarm list as it stands on a panel: what, why, what to do.
+struct AlarmText {
+  Alarm alarm;
+  std::string_view name;
+  std::string_view cause;
+  std::string_view cure;
+};
+/// All alarms in order of code; None is not among them.
+std::span<const AlarmText> alarm_table();
+/// The name in alarm_table(); "none" for None, "unknown alarm" for a number that is no alarm.
+std::string_view to_string(Alarm alarm);
 }  // namespace binpick::plc

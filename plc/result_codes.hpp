@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
+#include <string_view>
 
 namespace binpick::plc {
 /// Result codes as the PLC reads them. Values never change. Cause and cure of each stand in result_table().
@@ -18,4 +20,15 @@ enum class ResultCode : std::uint16_t {
   Aborted = 32,
   Fault = 40,
 };
+
+struct ResultText {
+  ResultCode code;
+  std::string_view name;
+  std::string_view cause;
+  std::string_view cure;
+};
+/// All codes in order; None is not among them.
+std::span<const ResultText> result_table();
+/// The name in result_table(); "none" for None, "unknown result code" for any other number.
+std::string_view to_string(ResultCode code);
 }  // namespace binpick::plc

@@ -12,11 +12,12 @@
 #include "base/clock.hpp"
 #include "base/frames.hpp"
 #include "plc/alarms.hpp"
+#include "plc/handshake.hpp"
 #include "plc/result_codes.hpp"
+#include "plc/words.hpp"
 
 /// The PLC's side of the cell: Modbus server, register image and pick handshake, without a socket.
 namespace binpick::plc {
-enum class WordOrder { HighWordFirst, LowWordFirst };  ///< S7: ABCD; Logix with COP: CDAB.
 enum class PoseConvention {
   UniversalRobots,
   Fanuc,
@@ -102,6 +103,9 @@ class Session {
  public:
   /// `boot_count` differs from that of the last start: the PLC sees the restart.
   Session(const Options& options, std::uint16_t boot_count);
+  ~Session();
+  Session(Session&&) noexcept;
+  Session& operator=(Session&&) noexcept;
 
   // The Modbus world, one call per connection event (drivers/link/tcp.hpp, TcpServer).
   bool on_accept(ConnectionId id, const std::string& address, std::uint16_t port, TimePoint now);
@@ -124,10 +128,11 @@ class Session {
   void clear(Alarm alarm, TimePoint now);                 ///< Its cause has gone.
   void reconfigure(const Options& options, TimePoint now);  ///< Between cycles: ids, allow-list, time-outs.
 
+  State state() const;
   std::uint16_t register_at(std::uint16_t offset) const;  ///< Word of the map, for tests and records.
 
  private:
   struct Impl;
-  std::shared_ptr<Impl> impl_;
+  std::unique_ptr<Impl> impl_;
 };
 }  // namespace binpick::plc
