@@ -36,6 +36,7 @@ struct Connected {};
 struct Fetched {
   std::uint16_t pick_id;
 };  ///< The pick was sent to the robot (again, perhaps).
+/// Once for each pick, also when it was withdrawn after the robot had fetched it: the robot was on its way.
 struct Reported {
   std::uint16_t pick_id;
   bool done;
@@ -45,6 +46,8 @@ struct Lost {
 };
 using Event = std::variant<Connected, Fetched, Reported, Lost>;
 
+/// One robot. What was offered and reported is on record beyond a connection, so that a robot that reconnects, or whose
+/// program starts anew at any point, finds it again. Each line is answered by one group of numbers (codec.hpp).
 class Session {
  public:
   explicit Session(const Options& options);
@@ -58,7 +61,9 @@ class Session {
   std::optional<Event> take_event();
   bool take_reopen();  ///< True once when the connection must be closed.
   bool connected() const;
+  std::uint64_t bad_lines() const;  ///< Requests that were not understood, since the start.
 
+  /// An offer of the same id again changes what the next fetch gets.
   void offer(const Pick& pick);
   void withdraw(NoPick reason);
 

@@ -1,0 +1,101 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "base/bytes.hpp"
+#include "base/expected.hpp"
+#include "drivers/robot/session.hpp"
+
+/// The robot's line protocol, dialect of Universal Robots. Pure functions: no socket, no clock, no log.
+/// The robot sends one line, the cell answers with one parenthesised group of numbers, as socket_read_ascii_float() of
+/// URScript reads it (Universal Robots script manual, "socket_read_ascii_float": at most 30 numbers, comma-separated).
+/// Every answer has the same number of fields, because before PolyScope 5.15 a list variable cannot change its length.
+/// The protocol is described for integrators in docs/robots/universal-robots.md.
+namespace binpick::drivers::robot {
+inline constexpr int kProtocolVersion = 1;
+/// Longest request without its line end. Strings of other makers' controllers hold 127 or 254 characters.
+inline constexpr std::size_t kLineBytesMax = 126;
+inline constexpr std::size_t kReplyFields = 20;
+/// No answer is longer than this, line end included; a longer group is not ours.
+inline constexpr std::size_t kReplyBytesMax = 512;
+
+/// What a line asks for.
+struct Request {
+  enum class Kind {
+    Hello,  ///< "hello": what is on record? Changes nothing.
+    Fetch,  ///< "fetch"
+    Done,   ///< "done 17"
+    Failed  ///< "failed 17"
+  } kind = Kind::Hello;
+  std::uint16_t pick_id = 0;  ///< Of a report, 1 … 65535.
+  bool is_report() const { return kind == Kind::Done || kind == Kind::Failed; }
+};
+
+struct BadLine {
+  enum class Kind { TooLong, NotText, UnknownWord, BadNumber, TooManyWords } kind = Kind::UnknownWord;
+};
+std::string to_string(const BadLine& error);
+
+/// One line without its line end.
+Expected<Request, BadLine> decode_request(std::string_view line);
+/// With its line end.
+std::string encode(const Request& request);
+
+/// Cuts a stream into lines: ended by LF or CR LF, without it; empty lines are skipped. A line of more than
+/// kLineBytesMax bytes is given once, as TooLong, when its end has come. Looks at each byte once.
+class LineReader {
+ public:
+  void push(ByteView bytes);
+  std::optional<Expected<std::string, BadLine>> next();
+  void clear();
+
+ private:
+  Bytes pending_;       // not looked at yet
+  std::size_t at_ = 0;  // in pending_
+  std::string line_;    // begun, not ended
+  bool too_long_ = false;
+};
+
+/// Second field of an answer. Values below 50 are those of the PLC's result code where both say the same.
+enum class Status : std::uint16_t {
+  NotReady = 0,     ///< No pick yet: ask again.
+  Pick = 1,         ///< Fields 3 … 18 hold.
+  ReportTaken = 2,  ///< The report is on record (also when it came twice).
+  Hello = 3,
+  SupplyEmpty = 10,
+  NothingFound = 11,
+  NotReachable = 12,
+  Fault = 40,
+  UnknownPick = 50,  ///< A report of a pick that is not open: forget it, fetch.
+  BadRequest = 51,   ///< The line was not understood.
+};
+
+enum class Outcome : std::uint16_t { None = 0, Done = 1, Failed = 2 };
+
+/// One answer. Fields in order: protocol version, status, pick id, sequence, part, objects left, approach pose (6),
+/// grasp pose (6), pick id of the last report on record, its outcome. Poses are tcp in base: metres, rotation vector.
+struct Reply {
+  Status status = Status::NotReady;
+  Pick pick;  ///< Default (all zero, identity) where there is none.
+  std::uint16_t reported_id = 0;
+  Outcome outcome = Outcome::None;
+};
+
+/// Plain decimals, at least six of them behind the point of lengths and angles, one line.
+std::string encode(const Reply& reply);
+
+struct BadReply {
+  std::string text;
+};
+struct DecodedReply {
+  Reply reply;
+  std::size_t consumed = 0;
+};
+/// First group of `text`; nullopt while it is incomplete. The robot's half, for emulators and tests.
+Expected<std::optional<DecodedReply>, BadReply> decode_reply(std::string_view text);
+}  // namespace binpick::drivers::robot
