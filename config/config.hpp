@@ -85,6 +85,7 @@ struct Diagnostic {
   std::string message;  ///< What is wrong; what to do.
   std::string source;   ///< The line itself.
 };
+/// Three lines without a final line end; one where there is no line to show.
 std::string to_string(const Diagnostic& diagnostic);
 
 /// Validates everything and returns all findings at once. Part files are read too; knowledge bases are not opened.

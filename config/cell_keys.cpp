@@ -1,0 +1,279 @@
+#include <iterator>
+
+#include "config/keys.hpp"
+
+namespace binpick::config {
+namespace {
+/// A choice of an enumeration: its values in the order of `choices`.
+template <class Enum, std::size_t n>
+Chosen chosen(Enum& target, const Enum (&values)[n]) {
+  std::vector<Enum> list(std::begin(values), std::end(values));
+  return {
+      [&target, list](std::size_t i) { target = list.at(i); },
+      [&target, list] { return static_cast<std::size_t>(std::find(list.begin(), list.end(), target) - list.begin()); }};
+}
+}  // namespace
+
+// A table, one key each: the formatter would give every field its own line.
+// clang-format off
+const std::vector<Section<Config>>& cell_sections() {
+  using enum Type;
+  using C = Config;
+  constexpr Change kRestart = Change::Restart;
+  static const std::vector<Section<Config>> sections = {
+      {"cell",
+       "The cell as a whole.",
+       {
+           {{.name = "name", .type = Text, .default_value = "\"cell\"", .example = "\"demo\"",
+             .help = "Name of the cell in the log."},
+            [](C& c) -> Slot { return &c.name; }},
+           {{.name = "state_dir", .type = Path, .default_value = "\"/var/lib/binpick\"", .change = kRestart,
+             .help = "Folder for what must survive a restart (the boot counter). The service owns it."},
+            [](C& c) -> Slot { return &c.state_dir; }},
+           {{.name = "picture_dir", .type = Path, .default_value = "\"\"",
+             .help = "A picture of each cycle's detection (PNG) goes to this folder; empty: none."},
+            [](C& c) -> Slot { return &c.picture_dir; }},
+       }},
+      {"plc",
+       "The Modbus/TCP server that the PLC asks for picks (docs/plc-registers.md).",
+       {
+           {{.name = "listen", .type = Endpoint, .default_value = "\"0.0.0.0:502\"", .change = kRestart,
+             .help = "Address and port to listen on. Ports below 1024 need the capability that the service has."},
+            [](C& c) -> Slot { return &c.plc_listen; }},
+           {{.name = "word_order", .type = Choice, .default_value = "\"s7\"", .change = kRestart,
+             .choices = {"s7", "logix"},
+             .help = "Order of the two words of a 32-bit value: s7 has the high word first, logix (COP) the low "
+                     "one."},
+            [](C& c) -> Slot {
+              return chosen(c.plc.word_order, {plc::WordOrder::HighWordFirst, plc::WordOrder::LowWordFirst});
+            }},
+           {{.name = "pose_convention", .type = Choice, .default_value = "\"ur\"", .change = kRestart,
+             .choices = {"ur", "fanuc", "kawasaki"},
+             .help = "How poses stand in the result block: ur is metres and a rotation vector, fanuc is mm and W "
+                     "P R in degrees, kawasaki is mm and O A T in degrees."},
+            [](C& c) -> Slot {
+              using enum plc::PoseConvention;
+              return chosen(c.plc.pose_convention, {UniversalRobots, Fanuc, Kawasaki});
+            }},
+           {{.name = "base_address", .type = Integer, .max = 65000, .default_value = "0", .change = kRestart,
+             .help = "Modbus address (counted from 0) of the first register of the map."},
+            [](C& c) -> Slot { return &c.plc.base_address; }},
+           {{.name = "allow", .type = Addresses, .default_value = "[]", .example = "[\"192.168.0.10\"]",
+             .help = "Addresses that may connect, the PLC's first of all. This machine itself always may, any "
+                     "other is refused."},
+            [](C& c) -> Slot { return &c.plc.allow; }},
+           {{.name = "connections_max", .type = Integer, .min = 1, .max = 64, .default_value = "8",
+             .change = kRestart,
+             .help = "Connections at the same time; one of them may write."},
+            [](C& c) -> Slot { return &c.plc.connections_max; }},
+           {{.name = "heartbeat_timeout_ms", .type = Integer, .unit = "ms", .max = 60000, .default_value = "3000",
+             .help = "The PLC's heartbeat word unchanged for this long is an alarm; 0: it is not watched."},
+            [](C& c) -> Slot { return &c.plc.heartbeat_timeout; }},
+           {{.name = "scan_timeout_ms", .type = Integer, .unit = "ms", .min = 1000, .max = 120000,
+             .default_value = "15000",
+             .help = "From the accepted request to the last profile; longer is a fault."},
+            [](C& c) -> Slot { return &c.plc.scan_timeout; }},
+           {{.name = "detect_timeout_ms", .type = Integer, .unit = "ms", .min = 200, .max = 120000,
+             .default_value = "5000",
+             .help = "From the last profile to the result; longer is a fault."},
+            [](C& c) -> Slot { return &c.plc.detect_timeout; }},
+       }},
+      {"pivot",
+       "The Schunk PR 70 (PowerCube) that turns the scanner.",
+       {
+           {{.name = "can", .type = CanBus, .required = true, .example = "\"can0\"", .change = kRestart,
+             .help = "The CAN bus: a network interface (can0), or cannelloni://HOST:PORT for CAN over UDP."},
+            [](C& c) -> Slot { return &c.pivot_can; }},
+           {{.name = "can_listen_port", .type = Integer, .max = 65535, .default_value = "0", .change = kRestart,
+             .help = "Own UDP port for cannelloni; 0: any."},
+            [](C& c) -> Slot { return &c.pivot_can_listen_port; }},
+           {{.name = "module_id", .type = Integer, .min = 1, .max = 31, .default_value = "12", .change = kRestart,
+             .help = "The module's number on the bus."},
+            [](C& c) -> Slot { return &c.pivot.module_id; }},
+           {{.name = "reply_timeout_ms", .type = Integer, .unit = "ms", .min = 10, .max = 5000,
+             .default_value = "100", .change = kRestart,
+             .help = "Silence after a request before it is repeated, then given up."},
+            [](C& c) -> Slot { return &c.pivot.reply_timeout; }},
+           {{.name = "sample_period_ms", .type = Integer, .unit = "ms", .min = 2, .max = 100, .default_value = "10",
+             .change = kRestart,
+             .help = "The module's position is asked this often."},
+            [](C& c) -> Slot { return &c.pivot.sample_period; }},
+           {{.name = "setpoint_horizon_ms", .type = Integer, .unit = "ms", .min = 20, .max = 2000,
+             .default_value = "200", .change = kRestart,
+             .help = "While moving, the module knows no target further ahead than this: so long it moves on when "
+                     "the daemon vanishes."},
+            [](C& c) -> Slot { return &c.pivot.setpoint_horizon; }},
+           {{.name = "reference_timeout_s", .type = Integer, .unit = "s", .min = 1, .max = 300,
+             .default_value = "30", .change = kRestart,
+             .help = "The module's homing takes no longer than this."},
+            [](C& c) -> Slot { return &c.pivot.reference_timeout; }},
+           {{.name = "latency_ms", .type = Number, .unit = "ms", .min = -200, .max = 200, .default_value = "0",
+             .help = "Added to the time of each position: how much later it was really taken than the answer says."},
+            [](C& c) -> Slot { return &c.pivot_latency; }},
+           {{.name = "T_base_pivot", .type = Transform, .required = true,
+             .example = "{ xyz_mm = [1200, 0, 1860], rpy_deg = [0, 90, 0] }",
+             .help = "Where the pivot stands in the robot's base frame. Its z axis is the axis of rotation."},
+            [](C& c) -> Slot { return &c.mount.T_base_pivot.iso; }},
+       }},
+      {"scanner",
+       "The line scanner.",
+       {
+           {{.name = "model", .type = Choice, .required = true, .example = "\"lms400\"", .change = kRestart,
+             .choices = {"lms400"},
+             .help = "lms400: SICK LMS 400."},
+            [](C&) -> Slot {
+              return Chosen{[](std::size_t) {}, [] { return std::size_t{0}; }};
+            }},
+           {{.name = "address", .type = Endpoint, .required = true, .example = "\"192.168.0.1:2111\"",
+             .change = kRestart,
+             .help = "Of the scanner."},
+            [](C& c) -> Slot { return &c.scanner_address; }},
+           {{.name = "frequency_hz", .type = Number, .unit = "Hz", .min = 150, .max = 500, .default_value = "360",
+             .change = kRestart,
+             .help = "Profiles per second. The device may set another value; it is then used and logged."},
+            [](C& c) -> Slot { return &c.scanner.frequency_hz; }},
+           {{.name = "resolution_deg", .type = Number, .unit = "deg", .min = 0.1, .max = 1, .default_value = "0.25",
+             .change = kRestart,
+             .help = "Between the points of a profile."},
+            [](C& c) -> Slot { return &c.scanner.resolution; }},
+           {{.name = "start_deg", .type = Number, .unit = "deg", .min = 55, .max = 125, .default_value = "55",
+             .example = "70", .change = kRestart,
+             .help = "Device angle of the first point; 90 is straight ahead."},
+            [](C& c) -> Slot { return &c.scanner.start; }},
+           {{.name = "range_deg", .type = Number, .unit = "deg", .min = 1, .max = 70, .default_value = "70",
+             .example = "40", .change = kRestart,
+             .help = "Opening angle; start_deg + range_deg is 125 at most."},
+            [](C& c) -> Slot { return &c.scanner.range; }},
+           {{.name = "extended_remission", .type = Flag, .default_value = "false", .change = kRestart,
+             .help = "For dark targets, remission below 10 %."},
+            [](C& c) -> Slot { return &c.scanner.extended_remission; }},
+           {{.name = "filter_mask", .type = Integer, .max = 15, .default_value = "0", .change = kRestart,
+             .help = "The device's own filters, added up: 1 median, 2 edge, 4 range, 8 mean."},
+            [](C& c) -> Slot { return &c.scanner.filter_mask; }},
+           {{.name = "reply_timeout_ms", .type = Integer, .unit = "ms", .min = 50, .max = 10000,
+             .default_value = "1000", .change = kRestart,
+             .help = "Silence after a command before giving up."},
+            [](C& c) -> Slot { return &c.scanner.reply_timeout; }},
+           {{.name = "spin_up_timeout_ms", .type = Integer, .unit = "ms", .min = 1000, .max = 60000,
+             .default_value = "10000", .change = kRestart,
+             .help = "The same for commands after which the motor has to settle."},
+            [](C& c) -> Slot { return &c.scanner.spin_up_timeout; }},
+           {{.name = "profile_timeout_ms", .type = Integer, .unit = "ms", .min = 50, .max = 1000,
+             .default_value = "500", .change = kRestart,
+             .help = "Silence while measuring before it is a fault."},
+            [](C& c) -> Slot { return &c.scanner.profile_timeout; }},
+           {{.name = "latency_ms", .type = Number, .unit = "ms", .min = -200, .max = 200, .default_value = "0",
+             .help = "A profile was measured this much before it came in."},
+            [](C& c) -> Slot { return &c.scanner_latency; }},
+           {{.name = "T_pivot_scanner", .type = Transform, .required = true,
+             .example = "{ xyz_mm = [60, 0, 0], rpy_deg = [180, -90, 0] }",
+             .help = "Where the scanner sits on the pivot at angle zero. Its z axis points straight ahead, x lies "
+                     "in the scan plane."},
+            [](C& c) -> Slot { return &c.mount.T_pivot_scanner.iso; }},
+       }},
+      {"robot",
+       "The socket that the robot's program fetches picks from (docs/robots/).",
+       {
+           {{.name = "dialect", .type = Choice, .default_value = "\"ur\"", .change = kRestart, .choices = {"ur"},
+             .help = "ur: Universal Robots."},
+            [](C& c) -> Slot { return chosen(c.robot.dialect, {drivers::robot::Dialect::UniversalRobots}); }},
+           {{.name = "listen", .type = Endpoint, .default_value = "\"\"", .example = "\"0.0.0.0:5002\"",
+             .change = kRestart,
+             .help = "Address and port to listen on; empty: no robot connects, the PLC forwards the movement."},
+            [](C& c) -> Slot { return &c.robot_listen; }},
+           {{.name = "allow", .type = Addresses, .default_value = "[]", .example = "[\"192.168.0.20\"]",
+             .help = "Addresses that may connect. This machine itself always may, any other is refused."},
+            [](C& c) -> Slot { return &c.robot_allow; }},
+           {{.name = "silence_max_s", .type = Integer, .unit = "s", .min = 1, .max = 3600, .default_value = "60",
+             .change = kRestart,
+             .help = "A robot that says nothing for this long is taken for gone."},
+            [](C& c) -> Slot { return &c.robot.silence_max; }},
+       }},
+      {"reach",
+       "What the gripper can reach.",
+       {
+           {{.name = "tilt_max_deg", .type = Number, .unit = "deg", .max = 90, .default_value = "40",
+             .help = "Between the tcp's z axis and straight down into the supply."},
+            [](C& c) -> Slot { return InRadians{&c.reach.tilt_max_rad}; }},
+           {{.name = "wall_clearance_mm", .type = Number, .unit = "mm", .max = 1000, .default_value = "0",
+             .help = "The tcp stays this far inside the supply's walls."},
+            [](C& c) -> Slot { return &c.reach.wall_clearance_mm; }},
+       }},
+      {"detection",
+       "Finding the objects.",
+       {
+           {{.name = "threads", .type = Integer, .min = 1, .max = 64, .default_value = "2",
+             .help = "The result does not depend on it."},
+            [](C& c) -> Slot { return &c.detection.threads; }},
+           {{.name = "deadline_ms", .type = Integer, .unit = "ms", .min = 100, .max = 60000, .default_value = "3000",
+             .help = "After this the best found so far is answered. Shorter than plc.detect_timeout_ms."},
+            [](C& c) -> Slot { return &c.detection.deadline; }},
+       }},
+  };
+  return sections;
+}
+
+const Section<Supply>& supply_section() {
+  using enum Type;
+  using S = Supply;
+  static const Section<Supply> section = {
+      "supply",
+      "A charge carrier and the sweep over it. One entry for each place that the PLC can name.",
+      {
+          {{.name = "id", .type = Integer, .min = 1, .max = 65535, .required = true, .example = "1",
+            .help = "By which the PLC names it."},
+           [](S& s) -> Slot { return &s.id; }},
+          {{.name = "name", .type = Text, .default_value = "\"\"", .example = "\"lattice box\"",
+            .help = "For the log."},
+           [](S& s) -> Slot { return &s.name; }},
+          {{.name = "size_mm", .type = Vector, .unit = "mm", .min = 10, .max = 5000, .required = true,
+            .example = "[1000, 800, 500]",
+            .help = "Inside: along x, along y, height of the walls."},
+           [](S& s) -> Slot { return &s.size_mm; }},
+          {{.name = "T_base_supply", .type = Transform, .required = true,
+            .example = "{ xyz_mm = [1200, 0, 0], rpy_deg = [0, 0, 0] }",
+            .help = "Middle of its floor in the robot's base frame, z up, x and y along the walls."},
+           [](S& s) -> Slot { return &s.T_base_supply.iso; }},
+          {{.name = "sweep_start_deg", .type = Number, .unit = "deg", .min = -160, .max = 160, .required = true,
+            .example = "-16",
+            .help = "Pivot angle at which measuring begins. The module's own limits hold too."},
+           [](S& s) -> Slot { return &s.sweep_start; }},
+          {{.name = "sweep_end_deg", .type = Number, .unit = "deg", .min = -160, .max = 160, .required = true,
+            .example = "16",
+            .help = "Pivot angle at which it ends."},
+           [](S& s) -> Slot { return &s.sweep_end; }},
+          {{.name = "sweep_speed_deg_s", .type = Number, .unit = "deg/s", .min = 1, .max = 149,
+            .default_value = "30", .example = "34",
+            .help = "Slower gives more profiles."},
+           [](S& s) -> Slot { return InRadians{&s.sweep_speed_rad_s}; }},
+      }};
+  return section;
+}
+
+const Section<RecipeEntry>& recipe_section() {
+  using enum Type;
+  using R = RecipeEntry;
+  static const Section<RecipeEntry> section = {
+      "part",
+      "A recipe: a part that the PLC can ask for.",
+      {
+          {{.name = "id", .type = Integer, .min = 1, .max = 65535, .required = true, .example = "1",
+            .help = "By which the PLC names it."},
+           [](R& r) -> Slot { return &r.recipe.id; }},
+          {{.name = "file", .type = Path, .required = true, .example = "\"track_link.toml\"",
+            .help = "Its PART.toml."},
+           [](R& r) -> Slot { return &r.file; }},
+          {{.name = "knowledge_base", .type = Path, .required = true, .example = "\"track_link.kb\"",
+            .help = "Made of the part file by binpick train."},
+           [](R& r) -> Slot { return &r.recipe.knowledge_base; }},
+          {{.name = "score_min", .type = Number, .max = 1, .default_value = "0.5",
+            .help = "An object found with a lower probability is not offered."},
+           [](R& r) -> Slot { return &r.recipe.score_min; }},
+          {{.name = "tilt_max_deg", .type = Number, .unit = "deg", .max = 90, .sample = "30",
+            .help = "For this part instead of reach.tilt_max_deg."},
+           [](R& r) -> Slot { return InRadiansIfGiven{&r.recipe.tilt_max_rad}; }},
+      }};
+  return section;
+}
+// clang-format on
+}  // namespace binpick::config

@@ -1,0 +1,150 @@
+#include "config/rules.hpp"
+
+#include <cmath>
+
+#include "config/wording.hpp"
+
+namespace binpick::config {
+namespace {
+constexpr double kFieldOfViewEndDeg = 125;  // LMS 400: 55 … 125, 90 straight ahead
+constexpr double kSweepMinDeg = 1;
+constexpr double kProfilesMin = 20;
+
+std::string rounded(double v) { return number_text(std::round(v * 1000) / 1000); }
+std::string ms(std::chrono::milliseconds d) { return std::to_string(d.count()); }
+
+std::string port_of(const std::string& endpoint) { return endpoint.substr(endpoint.rfind(':') + 1); }
+
+void check_devices(const Config& c, const CellPlaces& at, Findings& findings) {
+  const double end_deg = c.scanner.start.in_deg() + c.scanner.range.in_deg();
+  if (end_deg > kFieldOfViewEndDeg + 1e-9) {
+    const bool range_given = at.given("scanner", "range_deg");
+    findings.add(at.of("scanner", range_given ? "range_deg" : "start_deg"),
+                 "scanner.start_deg + scanner.range_deg = " + rounded(end_deg) +
+                     " is beyond the field of view, 55 … 125; use range_deg = " +
+                     rounded(kFieldOfViewEndDeg - c.scanner.start.in_deg()) + " at most");
+  }
+  if (c.pivot.setpoint_horizon < 2 * c.pivot.sample_period) {
+    const bool horizon_given = at.given("pivot", "setpoint_horizon_ms");
+    findings.add(at.of("pivot", horizon_given ? "setpoint_horizon_ms" : "sample_period_ms"),
+                 "pivot.setpoint_horizon_ms = " + ms(c.pivot.setpoint_horizon) +
+                     " is less than two sample periods of " + ms(c.pivot.sample_period) +
+                     " ms, the pivot would halt between set-points; use at least " + ms(2 * c.pivot.sample_period));
+  }
+  if (c.pivot_can_listen_port != 0 && at.given("pivot", "can") && !c.pivot_can.starts_with("cannelloni://"))
+    findings.add(at.of("pivot", "can_listen_port"),
+                 "pivot.can_listen_port is for cannelloni, but pivot.can is a network interface; remove it");
+}
+
+void check_servers(const Config& c, const CellPlaces& at, Findings& findings) {
+  if (const auto beat = c.plc.heartbeat_timeout; beat.count() > 0 && beat.count() < 100)
+    findings.add(at.of("plc", "heartbeat_timeout_ms"),
+                 "plc.heartbeat_timeout_ms = " + ms(beat) +
+                     " is shorter than a PLC's cycle may be; use 0 (not watched) or at least 100");
+  if (c.detection.deadline >= c.plc.detect_timeout) {
+    const bool deadline_given = at.given("detection", "deadline_ms");
+    findings.add(deadline_given ? at.of("detection", "deadline_ms") : at.of("plc", "detect_timeout_ms"),
+                 "detection.deadline_ms = " + ms(c.detection.deadline) +
+                     " is not shorter than plc.detect_timeout_ms = " + ms(c.plc.detect_timeout) +
+                     "; use less, or a longer time-out");
+  }
+  const std::string port = port_of(c.plc_listen);
+  if (!c.robot_listen.empty() && port != "0" && port == port_of(c.robot_listen))
+    findings.add(at.of("robot", "listen"),
+                 "robot.listen has the same port as plc.listen, " + port + "; use another, such as 5002");
+}
+
+void check_sweeps(const Config& c, const CellPlaces& at, Findings& findings) {
+  for (std::size_t i = 0; i < c.supplies.size(); ++i) {
+    const Supply& supply = c.supplies[i];
+    const Places& places = at.supplies[i];
+    if (!places.given("sweep_start_deg") || !places.given("sweep_end_deg")) continue;
+    const double range_deg = std::abs((supply.sweep_end - supply.sweep_start).in_deg());
+    const double duration_s = Angle::deg(range_deg).in_rad() / supply.sweep_speed_rad_s;
+    if (range_deg < kSweepMinDeg) {
+      findings.add(places.of("sweep_end_deg"), "supply.sweep_end_deg is " + rounded(range_deg) +
+                                                   " deg from sweep_start_deg, that is no sweep; use at least " +
+                                                   rounded(kSweepMinDeg));
+      continue;
+    }
+    const bool speed_given = places.given("sweep_speed_deg_s");
+    const Place& place = places.of(speed_given ? "sweep_speed_deg_s" : "sweep_end_deg");
+    if (duration_s >= in_s(c.plc.scan_timeout)) {
+      findings.add(place, "supply: the sweep takes " + rounded(duration_s) +
+                              " s, not less than plc.scan_timeout_ms = " + ms(c.plc.scan_timeout) +
+                              "; sweep faster, or use a longer time-out");
+    } else if (duration_s * c.scanner.frequency_hz < kProfilesMin) {
+      findings.add(place, "supply: the sweep gives " + rounded(std::floor(duration_s * c.scanner.frequency_hz)) +
+                              " profiles; sweep slower or farther, " + rounded(kProfilesMin) + " are the least");
+    }
+  }
+}
+
+template <class Entry>
+void check_ids(const std::vector<Entry>& entries, const std::vector<Places>& places, const std::string& section,
+               Findings& findings) {
+  for (std::size_t i = 0; i < entries.size(); ++i)
+    for (std::size_t k = 0; k < i; ++k)
+      if (places[i].given("id") && places[k].given("id") && entries[i].id == entries[k].id) {
+        findings.add(places[i].of("id"), section + ".id = " + std::to_string(entries[i].id) + " stands also in line " +
+                                             std::to_string(places[k].of("id").line) + "; give each entry its own");
+        break;
+      }
+}
+}  // namespace
+
+void check_rules(const Config& config, const CellPlaces& places, Findings& findings) {
+  check_devices(config, places, findings);
+  check_servers(config, places, findings);
+  check_sweeps(config, places, findings);
+  check_ids(config.supplies, places.supplies, "supply", findings);
+  check_ids(config.recipes, places.parts, "part", findings);
+}
+
+bool make_symmetry(const SymmetryEntry& entry, const Places& places, Findings& findings, vision::Symmetry& symmetry) {
+  enum Kind : std::size_t { kNone, kCyclic, kDihedral, kRevolution, kRevolutionFlip, kSphere };  // order of the choices
+  if (entry.axis.norm() < 1e-6) {
+    findings.add(places.of("axis"), "symmetry.axis is zero; use, for example, [0, 0, 1]");
+    return false;
+  }
+  const Eigen::Vector3d axis = entry.axis.normalized();
+  symmetry = {};
+  symmetry.centre_mm = entry.centre_mm;
+  symmetry.axis = axis;
+  switch (entry.kind) {
+    case kNone:
+      break;
+    case kRevolution:
+      symmetry.kind = vision::Symmetry::Kind::Revolution;
+      break;
+    case kRevolutionFlip:
+      symmetry.kind = vision::Symmetry::Kind::RevolutionFlip;
+      break;
+    case kSphere:
+      symmetry.kind = vision::Symmetry::Kind::Sphere;
+      break;
+    default: {
+      const bool flips = entry.kind == kDihedral;
+      const double tilt = flips && entry.flip_axis.norm() > 1e-6 ? std::abs(axis.dot(entry.flip_axis.normalized()))
+                          : flips                                ? 1.0
+                                                                 : 0.0;
+      if (tilt > 0.01) {
+        findings.add(places.of(places.given("flip_axis") ? "flip_axis" : "kind"),
+                     "symmetry.flip_axis is not at right angles to symmetry.axis; use one that is");
+        return false;
+      }
+      symmetry.kind = vision::Symmetry::Kind::Finite;
+      symmetry.rotations.clear();
+      for (int flip = 0; flip <= (flips ? 1 : 0); ++flip)
+        for (int turn = 0; turn < entry.fold; ++turn) {
+          Eigen::Matrix3d rotation =
+              Eigen::AngleAxisd(2 * std::numbers::pi * turn / entry.fold, axis).toRotationMatrix();
+          if (flip == 1) rotation = rotation * Eigen::AngleAxisd(std::numbers::pi, entry.flip_axis.normalized());
+          symmetry.rotations.push_back(turn == 0 && flip == 0 ? Eigen::Matrix3d::Identity() : rotation);
+        }
+      if (symmetry.rotations.size() == 1) symmetry.kind = vision::Symmetry::Kind::None;
+    }
+  }
+  return true;
+}
+}  // namespace binpick::config

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <vector>
+
+#include "config/reader.hpp"
+
+/// Rules across keys; ranges of single keys stand in the key table.
+namespace binpick::config {
+/// Where the sections of a cell file stand, in the order of `cell_sections()`, and its entries.
+struct CellPlaces {
+  std::map<std::string, Places, std::less<>> sections;
+  std::vector<Places> supplies;
+  std::vector<Places> parts;
+
+  const Place& of(const std::string& section, const std::string& key) const { return sections.at(section).of(key); }
+  /// False where a key was given but bad, or its section is: then a rule about it would only echo that.
+  bool given(const std::string& section, const std::string& key) const { return sections.at(section).given(key); }
+};
+
+/// Values that were bad hold their default while this runs, so that one mistake is not told twice.
+void check_rules(const Config& config, const CellPlaces& places, Findings& findings);
+/// Makes the group that [symmetry] describes; false with a finding when it describes none.
+bool make_symmetry(const SymmetryEntry& entry, const Places& places, Findings& findings, vision::Symmetry& symmetry);
+}  // namespace binpick::config
