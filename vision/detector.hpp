@@ -15,7 +15,7 @@ namespace binpick::vision {
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
 struct DetectorOptions {
-  int hypotheses_max = 4096;                          ///< Bound of the hypotheses that are tested.
+  int hypotheses_max = 16384;                         ///< Bound of the hypotheses that are tested.
   std::optional<double> noise_mm;                     ///< Expected depth noise, 1 sd; default: the knowledge base's.
   std::optional<std::chrono::milliseconds> deadline;  ///< Return the best so far.
   int threads = 2;                                    ///< The result does not depend on it.

@@ -1,0 +1,362 @@
+#include "vision/detector.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "vision/feature.hpp"
+#include "vision/knowledge_base_impl.hpp"
+#include "vision/maxima.hpp"
+#include "vision/selection.hpp"
+#include "vision/team.hpp"
+#include "vision/voting.hpp"
+
+namespace binpick::vision {
+namespace {
+using SteadyClock = std::chrono::steady_clock;
+
+/// How many hypotheses survive each stage. Thousands are cheap to test and dear to lose; only distinct survivors pay
+/// for a rendered test.
+constexpr std::size_t kSparseBest = 1500;
+constexpr std::size_t kDistinctBest = 240;
+constexpr std::size_t kTurnedBest = 16;
+constexpr std::size_t kRejectionsMax = 20;
+constexpr double kSparseToleranceDiameters = 0.035;
+/// A grid rotation is several degrees off, which moves the lowest point by so much.
+constexpr double kFloorGateDiameters = 0.05;
+constexpr double kWallGateDiameters = 0.04;
+constexpr double kSameDiameters = 0.12;
+/// Below this a hypothesis is no detection.
+constexpr double kScoreMin = 0.1;
+
+/// Supply's floor: known, or found as the level below which there is nothing and on which much lies, or unknown.
+float floor_of(const Scene& scene, const SupplyBox& supply) {
+  constexpr float kUnknown = -std::numeric_limits<float>::infinity();
+  if (supply.size_mm.x() > 0 && supply.size_mm.y() > 0) return 0;
+  std::vector<float> heights;
+  for (const float z : scene.z_mm.reshaped<Eigen::RowMajor>())
+    if (!std::isnan(z)) heights.push_back(z);
+  if (heights.empty()) return kUnknown;
+  const auto low = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 50);
+  std::nth_element(heights.begin(), low, heights.end());
+  const float band = 3 * static_cast<float>(scene.noise_mm);
+  double sum = 0;
+  std::size_t n = 0;
+  for (const float z : heights)
+    if (std::abs(z - *low) <= band) sum += z, ++n;
+  return n * 5 >= heights.size() ? static_cast<float>(sum / static_cast<double>(n)) : kUnknown;
+}
+
+struct Hypothesis {
+  std::uint32_t maximum = 0;
+  std::uint16_t view = 0;
+  Pose pose;
+  float evidence = 0;
+};
+
+bool stronger(const Hypothesis& a, const Hypothesis& b) { return a.evidence > b.evidence; }
+
+/// One detection under way: what all stages share.
+class Detecting {
+ public:
+  Detecting(const DepthImage& image, const SupplyBox& supply, const KnowledgeBase& base, const DetectorOptions& options)
+      : start_{SteadyClock::now()},
+        deadline_{options.deadline ? std::optional{start_ + *options.deadline} : std::nullopt},
+        image_{image},
+        supply_{supply},
+        part_{base.impl()},
+        options_{options},
+        rasteriser_{part_.mesh},
+        centroid_{part_.mesh.centroid_mm().cast<float>()} {
+    noise_mm_ = std::max(options.noise_mm.value_or(part_.noise_mm), 1e-3);
+    double sum = 0;
+    for (const Eigen::Vector3f& v : part_.mesh.vertices_mm) sum += (v - centroid_).squaredNorm();
+    radius_mm_ = std::sqrt(sum / std::max<double>(1, static_cast<double>(part_.mesh.vertices_mm.size())));
+  }
+
+  DetectionReport run() {
+    stage_start_ = SteadyClock::now();
+    scene_ = prepare_scene(image_, noise_mm_);
+    floor_mm_ = floor_of(scene_, supply_);
+    const double gate = std::max(3 * noise_mm_, kFloorGateDiameters * part_.diameter_mm);
+    lowest_allowed_mm_ = static_cast<float>(floor_mm_ - gate);
+    ended("surface");
+    const std::vector<Eigen::Vector3f> maxima = anchors();
+    report_.maxima = maxima.size();
+    ended("maxima");
+    const std::vector<Ballot> ballots = ballots_of(maxima);
+    ended("votes");
+    std::vector<Hypothesis> hypotheses = tested(maxima, ballots);
+    ended("sparse test");
+    nudge(hypotheses);
+    hypotheses = distinct(std::move(hypotheses));
+    ended("first refinement");
+    std::vector<Candidate> candidates = rendered(hypotheses);
+    add_turned(candidates);
+    ended("rendered test");
+    report(select(scene_, rasteriser_, part_.symmetry, std::move(candidates), select_options()));
+    ended("selection");
+    report_.time_ms = milliseconds_since(start_);
+    return std::move(report_);
+  }
+
+ private:
+  static double milliseconds_since(SteadyClock::time_point from) {
+    return std::chrono::duration<double, std::milli>(SteadyClock::now() - from).count();
+  }
+  void ended(const char* stage) {
+    report_.stages_ms[stage] = milliseconds_since(stage_start_);
+    stage_start_ = SteadyClock::now();
+  }
+
+  std::vector<Eigen::Vector3f> anchors() const {
+    MaximaOptions maxima;
+    maxima.diameter_mm = part_.diameter_mm;
+    // The flattest view's top is the lowest place of any anchor.
+    float rise = std::numeric_limits<float>::max();
+    for (const View& view : part_.views) rise = std::min(rise, -view.lowest_mm);
+    maxima.z_min_mm =
+        part_.views.empty() ? lowest_allowed_mm_ : std::max(lowest_allowed_mm_ + rise, lowest_allowed_mm_);
+    return find_maxima(scene_, maxima);
+  }
+
+  std::vector<Ballot> ballots_of(const std::vector<Eigen::Vector3f>& maxima) const {
+    VoteOptions votes;
+    votes.ballots_max = static_cast<std::size_t>(std::max(1, options_.hypotheses_max));
+    votes.reach_mm = std::max(1.0 * image_.pixel_mm, 0.05 * part_.diameter_mm);
+    votes.height_mm = std::max(3 * noise_mm_, 1.5 * image_.pixel_mm);
+    votes.z_floor_mm = lowest_allowed_mm_;
+    votes.threads = options_.threads;
+    const DepthImage smooth = smoothed(image_, smoothing_jump_mm(noise_mm_, image_.pixel_mm));
+    return vote(smooth, part_, maxima, votes, deadline_);
+  }
+
+  Pose pose_at(const Eigen::Vector3f& anchor, const View& view) const {
+    Pose pose;
+    pose.R = view.R_supply_object.toRotationMatrix();
+    pose.t = anchor - pose.R * view.anchors_object_mm.front();
+    return pose;
+  }
+
+  std::vector<Hypothesis> tested(const std::vector<Eigen::Vector3f>& maxima, const std::vector<Ballot>& ballots) {
+    report_.hypotheses = ballots.size();
+    const auto tolerance = static_cast<float>(
+        std::max(kSparseToleranceDiameters * part_.diameter_mm, static_cast<double>(tolerance_of(scene_))));
+    std::vector<float> evidence(ballots.size(), -1);
+    constexpr std::size_t kBlock = 64;
+    share(options_.threads, (ballots.size() + kBlock - 1) / kBlock, deadline_, [&](std::size_t block, int) {
+      for (std::size_t i = block * kBlock; i < std::min(ballots.size(), (block + 1) * kBlock); ++i)
+        evidence[i] = sparse_evidence(scene_, part_.views[ballots[i].view], maxima[ballots[i].maximum], tolerance);
+    });
+    std::vector<Hypothesis> hypotheses;
+    for (std::size_t i = 0; i < ballots.size(); ++i)
+      if (evidence[i] > 0)
+        hypotheses.push_back({ballots[i].maximum, ballots[i].view,
+                              pose_at(maxima[ballots[i].maximum], part_.views[ballots[i].view]), evidence[i]});
+    std::stable_sort(hypotheses.begin(), hypotheses.end(), stronger);
+    if (hypotheses.size() > kSparseBest) hypotheses.resize(kSparseBest);
+    return hypotheses;
+  }
+
+  /// A few steps of refinement on the view's own samples, then the sparse test again, more strictly.
+  void nudge(std::vector<Hypothesis>& hypotheses) const {
+    const float tolerance = tolerance_of(scene_);
+    RefineOptions options;
+    options.steps = 5;
+    options.gate_from_mm = std::max(3 * tolerance, static_cast<float>(0.06 * part_.diameter_mm));
+    options.gate_to_mm = std::max(2 * tolerance, static_cast<float>(0.03 * part_.diameter_mm));
+    options.edge_gate_from_px = 6;
+    options.edge_gate_to_px = 3;
+    share(options_.threads, hypotheses.size(), deadline_, [&](std::size_t i, int) {
+      Hypothesis& h = hypotheses[i];
+      const View& view = part_.views[h.view];
+      refine(scene_, model_points(view, h.pose), h.pose.R * centroid_ + h.pose.t, options, h.pose);
+      h.evidence = sparse_evidence(scene_, view, h.pose, 2 * tolerance);
+    });
+  }
+
+  std::vector<Hypothesis> distinct(std::vector<Hypothesis> hypotheses) const {
+    std::stable_sort(hypotheses.begin(), hypotheses.end(), stronger);
+    const double same_mm = 0.04 * part_.diameter_mm;
+    std::vector<Hypothesis> kept;
+    std::vector<Eigen::Vector3f> centres;
+    for (const Hypothesis& h : hypotheses) {
+      if (kept.size() >= kDistinctBest || h.evidence <= 0) break;
+      const Eigen::Vector3f centre = h.pose.R * centroid_ + h.pose.t;
+      bool again = false;
+      for (std::size_t k = 0; k < kept.size() && !again; ++k)
+        again = (centres[k] - centre).norm() < same_mm &&
+                displacement_mm({kept[k].pose, {}}, {h.pose, {}}, part_.symmetry, radius_mm_) < same_mm;
+      if (again) continue;
+      kept.push_back(h);
+      centres.push_back(centre);
+    }
+    return kept;
+  }
+
+  /// Refined against its own render, twice; then the rendered test.
+  Candidate render_and_refine(Pose pose, Template& drawn) const {
+    const float tolerance = tolerance_of(scene_);
+    Candidate candidate;
+    RefineOptions options;
+    options.steps = 5;
+    options.gate_from_mm = std::max(2 * tolerance, static_cast<float>(0.03 * part_.diameter_mm));
+    options.gate_to_mm = 2 * tolerance;
+    for (int round = 0; round < 2; ++round) {
+      rasteriser_.draw(pose.R, pose.t, scene_.pixel_mm, scene_.origin_mm, drawn);
+      const ModelPoints points = model_points(scene_, rasteriser_, pose, drawn, 400, 160);
+      candidate.information = refine(scene_, points, pose.R * centroid_ + pose.t, options, pose);
+      options.gate_from_mm = options.gate_to_mm = std::max(3.5F * static_cast<float>(noise_mm_), tolerance);
+      options.edge_gate_from_px = 2;
+      options.single_heights = true;
+    }
+    rasteriser_.draw(pose.R, pose.t, scene_.pixel_mm, scene_.origin_mm, drawn);
+    candidate.pose = pose;
+    candidate.test = dense_test(scene_, rasteriser_, pose, drawn);
+    return candidate;
+  }
+
+  std::vector<Candidate> rendered(const std::vector<Hypothesis>& hypotheses) const {
+    std::vector<Candidate> candidates(hypotheses.size());
+    std::vector<Template> drawn(static_cast<std::size_t>(std::clamp(options_.threads, 1, 64)));
+    share(options_.threads, hypotheses.size(), deadline_, [&](std::size_t i, int thread) {
+      candidates[i] = render_and_refine(hypotheses[i].pose, drawn[static_cast<std::size_t>(thread)]);
+    });
+    std::erase_if(candidates, [](const Candidate& c) { return c.test.evidence <= 0; });
+    std::stable_sort(candidates.begin(), candidates.end(),
+                     [](const Candidate& a, const Candidate& b) { return a.test.evidence > b.test.evidence; });
+    return candidates;
+  }
+
+  /// Parts look much alike from both sides, or end for end. The strongest candidates are tried in the quarter and half
+  /// turns about the part's principal axes that are no symmetry: either the turned one is better, or how much worse it
+  /// is tells how sure the first one is.
+  void add_turned(std::vector<Candidate>& candidates) const {
+    std::vector<Candidate> strongest;
+    for (const Candidate& c : candidates) {
+      if (strongest.size() >= kTurnedBest) break;
+      const bool again = std::any_of(strongest.begin(), strongest.end(), [&](const Candidate& other) {
+        return displacement_mm(other, c, part_.symmetry, radius_mm_) < kSameDiameters * part_.diameter_mm;
+      });
+      if (!again) strongest.push_back(c);
+    }
+    const std::vector<Eigen::Matrix3f> turns = principal_turns();
+    std::vector<Candidate> turned(strongest.size() * turns.size());
+    std::vector<Template> drawn(static_cast<std::size_t>(std::clamp(options_.threads, 1, 64)));
+    share(options_.threads, turned.size(), deadline_, [&](std::size_t i, int thread) {
+      Pose pose = strongest[i / turns.size()].pose;
+      const Eigen::Vector3f centre = pose.R * centroid_ + pose.t;
+      pose.R = pose.R * turns[i % turns.size()];
+      pose.t = centre - pose.R * centroid_;
+      turned[i] = render_and_refine(pose, drawn[static_cast<std::size_t>(thread)]);
+    });
+    for (const Candidate& c : turned)
+      if (c.test.evidence > 0) candidates.push_back(c);
+  }
+
+  std::vector<Eigen::Matrix3f> principal_turns() const {
+    Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+    for (const Eigen::Vector3f& v : part_.mesh.vertices_mm) {
+      const Eigen::Vector3d d = (v - centroid_).cast<double>();
+      spread += d * d.transpose();
+    }
+    const Eigen::Matrix3d axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors();
+    std::vector<Eigen::Matrix3f> turns;
+    for (int axis = 0; axis < 3; ++axis)
+      for (const int quarters : {1, 2, 3}) {
+        const Eigen::Matrix3d turn =
+            Eigen::AngleAxisd(0.5 * std::numbers::pi * quarters, axes.col(axis).normalized()).toRotationMatrix();
+        Eigen::Isometry3d moved = Eigen::Isometry3d::Identity();
+        const Eigen::Vector3d centroid = centroid_.cast<double>();
+        moved.linear() = turn;
+        moved.translation() = centroid - turn * centroid;
+        const PoseDistance distance = pose_distance(Eigen::Isometry3d::Identity(), moved, part_.symmetry, radius_mm_);
+        if (distance.angle_rad > 0.1 || distance.centroid_mm > 0.05 * part_.diameter_mm)
+          turns.push_back(turn.cast<float>());
+      }
+    return turns;
+  }
+
+  SelectOptions select_options() const {
+    SelectOptions options;
+    options.same_mm = kSameDiameters * part_.diameter_mm;
+    options.diameter_mm = part_.diameter_mm;
+    options.radius_mm = radius_mm_;
+    options.centroid_mm = centroid_.cast<double>();
+    return options;
+  }
+
+  /// Floor and walls at the refined pose, by every vertex.
+  std::string outside(const Pose& pose) const {
+    const double depth = std::max(3 * noise_mm_, 0.03 * part_.diameter_mm);
+    const double wall = kWallGateDiameters * part_.diameter_mm + 2 * scene_.pixel_mm;
+    float lowest = std::numeric_limits<float>::max();
+    Eigen::Vector2f reach = Eigen::Vector2f::Zero();
+    for (const Eigen::Vector3f& v : part_.mesh.vertices_mm) {
+      const Eigen::Vector3f p = pose.R * v + pose.t;
+      lowest = std::min(lowest, p.z());
+      reach = reach.cwiseMax(p.head<2>().cwiseAbs());
+    }
+    if (lowest < floor_mm_ - depth) return "reaches through the floor";
+    if (supply_.size_mm.x() > 0 && supply_.size_mm.y() > 0 &&
+        (reach.x() > 0.5 * supply_.size_mm.x() + wall || reach.y() > 0.5 * supply_.size_mm.y() + wall))
+      return "reaches through a wall";
+    return {};
+  }
+
+  Matrix6 covariance_of(const Matrix6& information) const {
+    // Single points are fewer than pixels where holes were filled; the scanner's own error is common to all of them.
+    constexpr double kCorrelation = 2.0;
+    constexpr double kCommonShare = 0.1;
+    Matrix6 prior = Matrix6::Zero();
+    prior.diagonal().head<3>().setConstant(1 / std::pow(0.1 * part_.diameter_mm, 2));
+    prior.diagonal().tail<3>().setConstant(1 / std::pow(0.3, 2));
+    Matrix6 covariance = (information / kCorrelation + prior).inverse();
+    covariance.diagonal().head<3>().array() += std::pow(kCommonShare * noise_mm_, 2);
+    return 0.5 * (covariance + covariance.transpose());
+  }
+
+  void report(const std::vector<Selected>& selected) {
+    for (const Selected& entry : selected) {
+      const Transform<frame::Supply, frame::Object> T{entry.candidate.pose.iso()};
+      std::string reason = entry.reason;
+      if (reason.empty()) reason = outside(entry.candidate.pose);
+      if (reason.empty() && entry.score < kScoreMin) reason = "too little evidence";
+      if (reason.empty()) {
+        Detection detection;
+        detection.T_supply_object = T;
+        detection.score = entry.score;
+        detection.visible_fraction = entry.candidate.test.visible_fraction();
+        detection.covariance = covariance_of(entry.candidate.information);
+        report_.detections.push_back(detection);
+      } else if (report_.rejected.size() < kRejectionsMax) {
+        report_.rejected.push_back({T, entry.score, reason});
+      }
+    }
+    if (options_.detections_max > 0 && report_.detections.size() > static_cast<std::size_t>(options_.detections_max))
+      report_.detections.resize(static_cast<std::size_t>(options_.detections_max));
+  }
+
+  SteadyClock::time_point start_, stage_start_;
+  Deadline deadline_;
+  const DepthImage& image_;
+  const SupplyBox& supply_;
+  const KnowledgeBase::Impl& part_;
+  const DetectorOptions& options_;
+  Rasteriser rasteriser_;
+  Eigen::Vector3f centroid_;
+  double noise_mm_ = 1, radius_mm_ = 1;
+  float floor_mm_ = 0, lowest_allowed_mm_ = 0;
+  Scene scene_;
+  DetectionReport report_;
+};
+}  // namespace
+
+DetectionReport detect(const DepthImage& image, const SupplyBox& supply, const KnowledgeBase& part,
+                       const DetectorOptions& options) {
+  return Detecting{image, supply, part, options}.run();
+}
+}  // namespace binpick::vision

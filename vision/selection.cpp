@@ -1,0 +1,131 @@
+#include "vision/selection.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+namespace binpick::vision {
+namespace {
+constexpr float kVisibleMin = 0.15F;
+constexpr float kContradictedMax = 0.25F;
+constexpr float kEdgeRatioMin = 0.35F;
+constexpr float kNormalAgreementMin = 0.5F;
+constexpr float kBendAgreementMin = 0.05F;
+constexpr double kClaimedMax = 0.5;
+constexpr double kInsideMax = 0.12;
+/// A rival has to speak of mostly the same pixels.
+constexpr double kRivalShare = 0.6;
+
+std::string percent(const char* text, double share) {
+  std::array<char, 100> line{};
+  std::snprintf(line.data(), line.size(), text, 100 * share);
+  return line.data();
+}
+
+/// What the candidate's own figures say against it.
+std::string own_reason(const DenseTest& test) {
+  if (test.explained == 0 || test.evidence <= 0) return "more contradicted than explained";
+  if (test.visible_fraction() < kVisibleMin) return percent("mostly hidden (%.0f %% seen)", test.visible_fraction());
+  if (test.contradicted_ratio() > kContradictedMax)
+    return percent("free space seen through it (%.0f %%)", test.contradicted_ratio());
+  if (test.edge_ratio() < kEdgeRatioMin) return percent("edges missing (%.0f %%)", 1 - test.edge_ratio());
+  if (test.normal_agreement < kNormalAgreementMin)
+    return percent("normals disagree (%.0f %%)", 1 - test.normal_agreement);
+  if (test.bend_agreement < kBendAgreementMin) return "curvature disagrees";
+  return {};
+}
+
+/// Columns in which both bodies claim the same room, over the columns of the smaller.
+double shared_room(const Template& a, const Template& b, float depth_mm) {
+  const int row_first = std::max(a.row0, b.row0), row_last = std::min(a.row0 + a.rows, b.row0 + b.rows);
+  const int col_first = std::max(a.col0, b.col0), col_last = std::min(a.col0 + a.cols, b.col0 + b.cols);
+  if (row_first >= row_last || col_first >= col_last) return 0;
+  int shared = 0;
+  for (int r = row_first; r < row_last; ++r)
+    for (int c = col_first; c < col_last; ++c) {
+      const std::size_t i = a.at(r - a.row0, c - a.col0), j = b.at(r - b.row0, c - b.col0);
+      if (a.triangle[i] < 0 || b.triangle[j] < 0) continue;
+      shared += std::min(a.top_mm[i], b.top_mm[j]) - std::max(a.bottom_mm[i], b.bottom_mm[j]) > depth_mm;
+    }
+  const auto columns = [](const Template& t) {
+    return std::count_if(t.triangle.begin(), t.triangle.end(), [](std::int32_t k) { return k >= 0; });
+  };
+  return static_cast<double>(shared) /
+         static_cast<double>(std::max<std::ptrdiff_t>(1, std::min(columns(a), columns(b))));
+}
+}  // namespace
+
+double displacement_mm(const Candidate& a, const Candidate& b, const Symmetry& symmetry, double radius_mm) {
+  const PoseDistance distance = pose_distance(a.pose.iso(), b.pose.iso(), symmetry, radius_mm);
+  const double turn = 2 * std::sin(0.5 * distance.angle_rad) * radius_mm;
+  return std::hypot(distance.centroid_mm, std::sqrt(2.0 / 3.0) * turn);
+}
+
+double score_of(const Candidate& candidate) {
+  const DenseTest& t = candidate.test;
+  const double logit = -4.0 + 4.0 * std::min(1.0F, t.visible_fraction() / 0.6F) - 14.0 * t.contradicted_ratio() +
+                       3.0 * t.edge_ratio() + 3.0 * (t.normal_agreement - 0.5) + 2.0 * t.bend_agreement -
+                       6.0 * std::max(0.0F, candidate.rival - 0.6F);
+  return 1 / (1 + std::exp(-logit));
+}
+
+std::vector<Selected> select(const Scene& scene, const Rasteriser& part, const Symmetry& symmetry,
+                             std::vector<Candidate> candidates, const SelectOptions& options) {
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.test.evidence > b.test.evidence; });
+  struct Standing {
+    std::size_t selected;
+    Template drawn;
+  };
+  std::vector<Standing> standing;
+  std::vector<Selected> all;
+  Grid<std::int32_t> owner = Grid<std::int32_t>::Constant(scene.rows(), scene.cols(), -1);
+  const auto room_mm = static_cast<float>(2 * tolerance_of(scene) + 0.01 * options.diameter_mm);
+
+  for (Candidate& candidate : candidates) {
+    const bool again = std::any_of(standing.begin(), standing.end(), [&](const Standing& s) {
+      return displacement_mm(all[s.selected].candidate, candidate, symmetry, options.radius_mm) < options.same_mm;
+    });
+    if (again) continue;
+    Selected entry{candidate, 0, own_reason(candidate.test)};
+    Template drawn;
+    part.draw(candidate.pose.R, candidate.pose.t, scene.pixel_mm, scene.origin_mm, drawn);
+    const std::vector<PixelState> states = compare(scene, part, candidate.pose, drawn);
+    if (entry.reason.empty()) {
+      std::vector<int> claims(standing.size(), 0);
+      int explained = 0, claimed = 0;
+      for (int r = 0; r < drawn.rows; ++r)
+        for (int c = 0; c < drawn.cols; ++c) {
+          if (states[drawn.at(r, c)] != PixelState::Explained) continue;
+          ++explained;
+          const std::int32_t other = owner(r + drawn.row0, c + drawn.col0);
+          if (other < 0) continue;
+          ++claimed;
+          ++claims[static_cast<std::size_t>(other)];
+        }
+      for (std::size_t s = 0; s < standing.size(); ++s) {
+        const double share = static_cast<double>(claims[s]) / std::max(1, explained);
+        Candidate& better = all[standing[s].selected].candidate;
+        if (share > kRivalShare) better.rival = std::max(better.rival, candidate.test.evidence / better.test.evidence);
+        if (entry.reason.empty() && share <= kClaimedMax && shared_room(standing[s].drawn, drawn, room_mm) > kInsideMax)
+          entry.reason = "stands inside a better one";
+      }
+      if (claimed > kClaimedMax * explained) entry.reason = "explained by a better one";
+    }
+    if (entry.reason.empty()) {
+      for (int r = 0; r < drawn.rows; ++r)
+        for (int c = 0; c < drawn.cols; ++c)
+          if (states[drawn.at(r, c)] == PixelState::Explained) {
+            std::int32_t& at = owner(r + drawn.row0, c + drawn.col0);
+            if (at < 0) at = static_cast<std::int32_t>(standing.size());
+          }
+      standing.push_back({all.size(), std::move(drawn)});
+    }
+    all.push_back(std::move(entry));
+  }
+  for (Selected& entry : all) entry.score = score_of(entry.candidate);
+  std::stable_sort(all.begin(), all.end(), [](const Selected& a, const Selected& b) { return a.score > b.score; });
+  return all;
+}
+}  // namespace binpick::vision

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <Eigen/Geometry>
+
+#include "vision/knowledge_base_impl.hpp"
+#include "vision/rasteriser.hpp"
+#include "vision/scene.hpp"
+
+namespace binpick::vision {
+/// Supply from object, single precision: what thousands of hypotheses are tested in.
+struct Pose {
+  Eigen::Matrix3f R = Eigen::Matrix3f::Identity();
+  Eigen::Vector3f t = Eigen::Vector3f::Zero();
+
+  Eigen::Isometry3d iso() const;
+};
+
+/// Largest difference between the measured and the rendered height that counts as explained, by slope of the surface:
+/// 1.5 sd of the noise (the surface is smoothed over 9 pixels), or the height of a third of a pixel.
+float tolerance_of(const Scene& scene);
+
+/// Test of a view on its scattered sample points only: what it explains less what it contradicts, in pixels of the
+/// whole silhouette. `p_supply` is the place of the view's first anchor.
+float sparse_evidence(const Scene& scene, const View& view, const Eigen::Vector3f& p_supply, float tolerance_mm);
+/// The same for a pose that has left the view's own rotation.
+float sparse_evidence(const Scene& scene, const View& view, const Pose& pose, float tolerance_mm);
+
+/// A pose, rendered and compared pixel by pixel with the measured surface.
+struct DenseTest {
+  int pixels = 0;              ///< Of the silhouette.
+  int explained = 0;           ///< Measured where the model lies.
+  int contradicted = 0;        ///< Measured below the model: seen through it.
+  int occluded = 0;            ///< Measured above the model: something lies on it.
+  int missing = 0;             ///< Not measured, or outside the picture.
+  float fit = 0;               ///< Explained pixels, each weighted by how well, over explained pixels.
+  int edges_found = 0;         ///< Depth jumps of the model that the scene has too.
+  int edges_missing = 0;       ///< Depth jumps of the model where the measured surface goes on.
+  float normal_agreement = 1;  ///< Share of explained pixels whose normals agree.
+  float bend_agreement = 1;    ///< Correlation of the curvatures; 1 where the model has none.
+  float evidence = 0;          ///< Explained less contradicted pixels and missing edges: what decides the order.
+
+  float visible_fraction() const;
+  float contradicted_ratio() const;
+  float edge_ratio() const;
+};
+/// `drawn` is the pose's template (Rasteriser::draw).
+DenseTest dense_test(const Scene& scene, const Rasteriser& part, const Pose& pose, const Template& drawn);
+
+/// How one pixel of a template compares with the scene.
+enum class PixelState : std::uint8_t { Empty, Explained, Contradicted, Occluded, Missing };
+std::vector<PixelState> compare(const Scene& scene, const Rasteriser& part, const Pose& pose, const Template& drawn);
+}  // namespace binpick::vision
