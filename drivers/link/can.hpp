@@ -24,7 +24,8 @@ struct CanFrame {
   friend bool operator==(const CanFrame&, const CanFrame&) = default;
 };
 
-/// Frames that pass: (id & mask) == (filter.id & mask), standard data frames only.
+/// Frames that pass: (id & mask) == (filter.id & mask), standard data frames only. A link without filters passes all
+/// frames; error frames always pass.
 struct CanFilter {
   std::uint32_t id = 0;
   std::uint32_t mask = 0x7FF;
