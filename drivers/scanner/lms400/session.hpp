@@ -25,6 +25,7 @@ struct Options {
   std::chrono::milliseconds spin_up_timeout{
       10000};  ///< For sAN of setscanconfig and reqdata: the motor may have to settle.
   std::chrono::milliseconds profile_timeout{500};  ///< Silence while measuring before it is a fault.
+  std::chrono::milliseconds idle_check{1000};      ///< When idle, a harmless variable is read this often: 0 never.
 };
 
 /// One scan line. Point i lies at device angle first + i * step, in the scanner frame at
@@ -54,6 +55,7 @@ struct Failed {
 using Event = std::variant<Ready, ProfileReceived, Stopped, Failed>;
 
 /// One connection to one LMS 400: Offline → Starting → Idle ⇄ Measuring.
+/// Owns no socket, reads no clock. Not thread-safe: used by the loop's thread only.
 class Session {
  public:
   enum class State { Offline, Starting, Idle, Measuring };
@@ -70,9 +72,10 @@ class Session {
   bool take_reopen();  ///< True once when the connection must be dropped and opened again.
   State state() const;
 
-  void start_measuring(TimePoint now);  ///< Only when Idle.
+  void start_measuring(TimePoint now);  ///< When Idle; while a stop is under way it follows. Else ignored and logged.
   void stop_measuring(TimePoint now);   ///< Only when Measuring; profiles may still come until Stopped.
   std::uint64_t profiles_lost() const;  ///< By gaps in the counter, since start_measuring.
+  std::uint64_t bytes_skipped() const;  ///< That belonged to no frame, since on_connected.
 
  private:
   struct Impl;
