@@ -142,14 +142,16 @@ ExamplePart steering_wheel() {
     shapes::append(part.mesh, shapes::hexahedron(corners));
     part.pieces.push_back({{corners.begin(), corners.end()}});
   }
-  constexpr int rim_pieces = 18, rings = 8;
+  // Straight pieces cut the corners of a round rim: half of the sagitta is given back.
+  constexpr int rim_pieces = 24, rings = 8;
+  constexpr float outwards = 0.8F;
   for (int piece = 0; piece < rim_pieces; ++piece) {
     ConvexPiece segment;
     for (const int end : {piece, piece + 1}) {
       const float u = 2 * kPi * static_cast<float>(end) / rim_pieces;
       for (int ring = 0; ring < rings; ++ring) {
         const float v = 2 * kPi * static_cast<float>(ring) / rings;
-        const float radius = rim + tube * std::cos(v);
+        const float radius = rim + outwards + tube * std::cos(v);
         segment.points_mm.push_back({radius * std::cos(u), radius * std::sin(u), tube * std::sin(v)});
       }
     }
