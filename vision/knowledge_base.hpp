@@ -1,9 +1,11 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "base/expected.hpp"
@@ -57,6 +59,8 @@ class KnowledgeBase {
  public:
   /// Reads and verifies the whole file (version, length, checksum).
   static Expected<KnowledgeBase, KnowledgeBaseError> open(const std::string& path);
+  /// The same for a file's bytes; `name` stands in the messages.
+  static Expected<KnowledgeBase, KnowledgeBaseError> parse(std::span<const std::byte> bytes, const std::string& name);
   Expected<void, KnowledgeBaseError> save(const std::string& path) const;
 
   const std::string& part_name() const;

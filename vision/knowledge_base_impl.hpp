@@ -54,4 +54,7 @@ struct KnowledgeBase::Impl {
   std::vector<std::uint32_t> offsets;  ///< kFeatureCount + 1: votes of feature f are [offsets[f], offsets[f + 1]).
   std::vector<Vote> votes;
 };
+
+/// Length of the file that save() writes.
+std::size_t knowledge_base_bytes(const KnowledgeBase::Impl& part);
 }  // namespace binpick::vision

@@ -1,0 +1,160 @@
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <thread>
+
+#include "vision/knowledge_base_impl.hpp"
+#include "vision/renderer.hpp"
+#include "vision/rotations.hpp"
+#include "vision/surface.hpp"
+#include "vision/view.hpp"
+#include "vision/votes.hpp"
+
+namespace binpick::vision {
+namespace {
+constexpr double kSmallPartMm = 150;  ///< Below, a part belongs to the triangulation scanners.
+constexpr int kRotationsMax = 60'000;
+constexpr int kLooks = 4;
+constexpr std::size_t kVotesPerView = 256;
+
+double default_pixel_mm(const Mesh& mesh, const ScannerFigures& figures, double diameter_mm) {
+  const double spacing = std::max(figures.spacing_along_mm, figures.spacing_across_mm);
+  // A quarter of the part's thinnest direction, by its surface's deviation (a plate's is half its thickness).
+  const Eigen::Vector3d variance = surface_covariance(mesh).selfadjointView<Eigen::Lower>().eigenvalues();
+  const double thin = 0.5 * std::sqrt(std::max(0.0, variance.minCoeff()));
+  const double pixel = std::min(0.5 * spacing, std::max(thin, 0.25 * spacing));
+  return std::max(pixel, diameter_mm / 120);  // A vote reaches 127 pixels.
+}
+
+/// What resolve() made of the options and the mesh; the votes are still to come.
+KnowledgeBase::Impl resolved(const Mesh& mesh, const PartOptions& options) {
+  KnowledgeBase::Impl part;
+  part.part_name = options.name;
+  part.mesh = mesh;
+  part.mesh_hash = mesh_hash(mesh);
+  part.diameter_mm = mesh.diameter_mm();
+  part.scanner = options.scanner.value_or(part.diameter_mm < kSmallPartMm ? ScannerClass::Lps36 : ScannerClass::Lms400);
+  const ScannerFigures& figures = figures_of(part.scanner);
+  part.noise_mm = figures.noise_mm;
+  part.pixel_mm = options.pixel_mm.value_or(default_pixel_mm(mesh, figures, part.diameter_mm));
+  part.dz_quantum_mm = std::max(0.25 * part.noise_mm, part.diameter_mm / 30'000);
+  // What the scanner's noise hides is no difference.
+  const double tolerance =
+      options.symmetry_tolerance_mm.value_or(std::max(0.5 * part.noise_mm, 0.005 * part.diameter_mm));
+  part.symmetry = options.symmetry ? *options.symmetry : find_symmetry(mesh, tolerance);
+  part.feature_stride = std::clamp(static_cast<int>(std::lround(0.04 * part.diameter_mm / part.pixel_mm)), 1, 4);
+  part.feature_tolerance_mm =
+      static_cast<float>(std::max(1.6 * part.noise_mm, 0.25 * part.pixel_mm * part.feature_stride));
+  return part;
+}
+
+struct Trained {
+  View view;
+  std::vector<RawVote> votes;
+};
+
+Trained train_view(const KnowledgeBase::Impl& part, const Eigen::Quaterniond& rotation, std::uint64_t seed,
+                   DepthRenderer& renderer) {
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.linear() = rotation.toRotationMatrix();
+  const int margin = kRingReach * part.feature_stride + 1;
+  // Two places on the pixel grid: what depends on where the grid falls is not kept.
+  std::vector<DepthImage> renders;
+  for (const double shift : {0.0, 0.5}) {
+    renders.push_back(window_around(part.mesh, T.linear(), part.pixel_mm, margin, {shift, shift}));
+    renderer.render(T, renders.back());
+  }
+  Trained trained;
+  trained.view = view_of(renders.front(), part.mesh, rotation, part.noise_mm, part.diameter_mm);
+  LookOptions look;
+  look.rule = {part.feature_tolerance_mm, part.feature_stride};
+  look.noise_mm = part.noise_mm;
+  look.dz_quantum_mm = part.dz_quantum_mm;
+  look.looks = kLooks;
+  look.seed = seed;
+  trained.votes = look_at(renders, trained.view, look);
+  return trained;
+}
+
+std::vector<Trained> train_views(const KnowledgeBase::Impl& part, const std::vector<Eigen::Quaterniond>& rotations,
+                                 std::uint64_t seed, const std::function<void(TrainingProgress)>& progress,
+                                 int threads) {
+  std::vector<Trained> trained(rotations.size());
+  std::atomic<std::size_t> next{0};
+  constexpr std::size_t kBlock = 32;
+  const auto run = [&](bool reports) {
+    const auto renderer = make_osmesa_renderer(part.mesh);
+    for (std::size_t first = next.fetch_add(kBlock); first < rotations.size(); first = next.fetch_add(kBlock)) {
+      for (std::size_t i = first; i < std::min(first + kBlock, rotations.size()); ++i)
+        trained[i] = train_view(part, rotations[i], seed * 0x9E3779B97F4A7C15ULL + i, *renderer);
+      if (reports && progress) progress({static_cast<double>(first) / static_cast<double>(rotations.size())});
+    }
+  };
+  std::vector<std::jthread> others;
+  for (int t = 1; t < threads; ++t) others.emplace_back(run, false);
+  run(true);
+  return trained;
+}
+}  // namespace
+
+const ScannerFigures& figures_of(ScannerClass scanner) {
+  // noise, spacing along and across the sweep, stand-off
+  static constexpr ScannerFigures kLps36Hi{0.12, 0.5, 0.5, 420}, kLps36{0.5, 1, 1, 500}, kLms400{3, 3, 7.9, 1800};
+  switch (scanner) {
+    case ScannerClass::Lps36Hi:
+      return kLps36Hi;
+    case ScannerClass::Lps36:
+      return kLps36;
+    case ScannerClass::Lms400:
+      return kLms400;
+  }
+  return kLps36;
+}
+
+Expected<KnowledgeBase, MeshError> train(const Mesh& mesh, const PartOptions& options,
+                                         const std::function<void(TrainingProgress)>& progress,
+                                         TrainingSummary* summary, int threads) {
+  const auto start = std::chrono::steady_clock::now();
+  const auto failed = [&](const std::string& why) {
+    return unexpected(MeshError{"part " + options.name + ": " + why});
+  };
+  if (mesh.triangles.empty()) return failed("the mesh holds no triangle; export the part as a surface mesh");
+  auto part = std::make_shared<KnowledgeBase::Impl>(resolved(mesh, options));
+  if (!(part->diameter_mm > 0)) return failed("the mesh has no extent; check mesh_unit");
+  if (!(part->pixel_mm > 0) || part->diameter_mm / part->pixel_mm > 1000)
+    return failed("a pixel of " + std::to_string(part->pixel_mm) + " mm is too small for a part of " +
+                  std::to_string(part->diameter_mm) + " mm; check mesh_unit and pixel_mm");
+  if (part->diameter_mm < 4 * part->pixel_mm)
+    return failed("the part's diameter is " + std::to_string(part->diameter_mm) + " mm, too small for pixels of " +
+                  std::to_string(part->pixel_mm) + " mm; check mesh_unit, pixel_mm and scanner");
+  const int asked = options.rotations.value_or(part->scanner == ScannerClass::Lms400 ? 10'000 : 20'000);
+  const auto rotations = training_rotations(std::clamp(asked, 1, kRotationsMax), part->symmetry);
+  if (threads <= 0) threads = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 64);
+  std::vector<Trained> trained = train_views(*part, rotations, options.seed, progress, threads);
+
+  std::vector<std::vector<RawVote>> votes;
+  for (Trained& t : trained) {
+    // A plate on edge between two columns of pixels shows nothing.
+    if (t.view.anchors_object_mm.empty() || t.view.surface.empty()) continue;
+    part->views.push_back(std::move(t.view));
+    votes.push_back(std::move(t.votes));
+  }
+  trained.clear();
+  if (part->views.empty()) return failed("no view shows anything of the mesh; check mesh_unit and pixel_mm");
+  VoteTable table = build_votes(
+      votes, static_cast<std::uint32_t>(std::max(0, options.votes_per_feature_max.value_or(0))), kVotesPerView);
+  part->offsets = std::move(table.offsets);
+  part->votes = std::move(table.votes);
+  if (progress) progress({1.0});
+  if (summary != nullptr) {
+    summary->symmetry = part->symmetry;
+    summary->rotations = static_cast<int>(part->views.size());
+    summary->votes = part->votes.size();
+    summary->mib = static_cast<double>(knowledge_base_bytes(*part)) / (1 << 20);
+    summary->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  }
+  return KnowledgeBase(std::move(part));
+}
+}  // namespace binpick::vision
