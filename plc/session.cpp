@@ -68,8 +68,8 @@ struct Session::Impl {
                limits_of(opts),
                {[this](modbus::WrittenRange range, TimePoint now) { on_written(range, now); },
                 [this](TimePoint now) { on_writer_gone(now); },
-                [this](const std::string&, TimePoint) { alarms.raise(Alarm::PlcSecondWriter), refresh(); },
-                [this](TimePoint) { alarms.clear(Alarm::PlcSecondWriter), refresh(); }}} {
+                [this](const std::string&, TimePoint now) { on_second_writer(true, now); },
+                [this](TimePoint now) { on_second_writer(false, now); }}} {
     BINPICK_CHECK(std::size_t{opts.base_address} + kMapLength <= 65536);
     refresh();
   }
@@ -90,6 +90,7 @@ struct Session::Impl {
   // What the PLC wrote.
   void on_written(modbus::WrittenRange range, TimePoint now);
   void on_writer_gone(TimePoint now);
+  void on_second_writer(bool there, TimePoint now);
   void on_request_level(TimePoint now);
   Signal classify(const PickRequest& request);
   bool raised(std::uint16_t bit) const { return (word(at("control")) & bit) != 0; }
@@ -218,6 +219,14 @@ void Session::Impl::on_writer_gone(TimePoint now) {
   settle(now);
 }
 
+void Session::Impl::on_second_writer(bool there, TimePoint now) {
+  if (there)
+    alarms.raise(Alarm::PlcSecondWriter);
+  else
+    alarms.clear(Alarm::PlcSecondWriter);
+  settle(now);
+}
+
 void Session::Impl::on_request_level(TimePoint now) {
   if (!raised(control::kRequest)) return;
   asked = request_in_words();
@@ -239,11 +248,12 @@ Signal Session::Impl::classify(const PickRequest& request) {
     refusal = code;
     return Signal::BadRequest;
   };
-  if (raised(control::kAbort)) return bad(ResultCode::Aborted);
+  // First of all: what was accepted has one answer, whatever else stands.
   if (request.sequence == accepted.sequence) {
     const bool same = request.part_id == accepted.part_id && request.supply_id == accepted.supply_id;
     return same ? Signal::RepeatedRequest : bad(ResultCode::BadSequence);
   }
+  if (raised(control::kAbort)) return bad(ResultCode::Aborted);
   if (std::ranges::find(options.part_ids, request.part_id) == options.part_ids.end())
     return bad(ResultCode::UnknownPart);
   if (std::ranges::find(options.supply_ids, request.supply_id) == options.supply_ids.end())

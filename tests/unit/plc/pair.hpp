@@ -1,0 +1,126 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+
+#include "plc/session.hpp"
+#include "tests/emulators/plc/plc.hpp"
+#include "tests/unit/plc/rig.hpp"
+
+namespace binpick::plc::test {
+/// Session and emulated PLC joined in memory, in virtual time, with a cell that answers picks by itself: the scan takes
+/// 1 s, the detection 0.2 s.
+class Pair {
+ public:
+  explicit Pair(const Options& cell_options, const emulators::PlcOptions& plc_options = {})
+      : plc{plc_options}, options_{cell_options}, session{std::make_unique<Session>(cell_options, boot_count_)} {
+    session->set_not_ready(0, now);
+  }
+
+  void restart_cell() {
+    disconnect();
+    session = std::make_unique<Session>(options_, ++boot_count_);
+    session->set_not_ready(0, now);
+    scan_done_at.reset();
+    result_at.reset();
+  }
+
+  void run_for(Duration duration) {
+    const TimePoint end = now + duration;
+    while (true) {
+      settle();
+      std::optional<TimePoint> next =
+          earlier(earlier(plc.deadline(), session->deadline()), earlier(scan_done_at, result_at));
+      if (!connected_ && !plc.faults.unplugged) next = earlier(next, reconnect_at_);
+      if (!next || *next > end) break;
+      now = std::max(now, *next);
+      step();
+    }
+    now = end;
+  }
+  bool run_until(const std::function<bool()>& condition, Duration at_most = 60s) {
+    const TimePoint end = now + at_most;
+    while (!condition() && now < end) run_for(10ms);
+    return condition();
+  }
+
+  TimePoint now{1000s};
+  emulators::Plc plc;
+
+ private:
+  Options options_;
+  std::uint16_t boot_count_ = 1;
+
+ public:
+  std::unique_ptr<Session> session;
+  std::vector<std::uint16_t> accepted;  ///< Sequence numbers in order.
+  unsigned aborted = 0, resets = 0, lost = 0, back = 0;
+  std::optional<TimePoint> scan_done_at, result_at;
+  PickResult next_result = Rig::pick(1);
+
+ private:
+  void disconnect() {
+    if (!connected_) return;
+    connected_ = false;
+    session->on_closed(id_, now);
+    plc.on_disconnected(now);
+    reconnect_at_ = now + 200ms;
+  }
+
+  void step() {
+    if (!connected_ && !plc.faults.unplugged && now >= reconnect_at_) {
+      connected_ = session->on_accept(++id_, "192.168.0.10", 4000, now);
+      if (connected_)
+        plc.on_connected(now);
+      else
+        reconnect_at_ = now + 200ms;
+    }
+    if (const auto at = plc.deadline(); at && *at <= now) plc.on_deadline(now);
+    if (const auto at = session->deadline(); at && *at <= now) session->on_deadline(now);
+    if (scan_done_at && *scan_done_at <= now) {
+      scan_done_at.reset();
+      session->on_scan_done(now);
+      result_at = now + 200ms;
+    }
+    if (result_at && *result_at <= now) {
+      result_at.reset();
+      session->publish(next_result, now);
+      ++next_result.pick_id;
+    }
+  }
+
+  void settle() {
+    if (plc.faults.unplugged) disconnect();
+    bool any = true;
+    while (any) {
+      any = false;
+      if (connected_) {
+        if (const Bytes to_cell = plc.take_output(); !to_cell.empty()) session->on_bytes(id_, to_cell, now), any = true;
+        if (const Bytes to_plc = session->take_output(id_); !to_plc.empty()) plc.on_bytes(to_plc, now), any = true;
+        if (session->wants_close(id_) || plc.take_reopen()) disconnect(), any = true;
+      }
+      while (const auto event = session->take_event()) on(*event), any = true;
+    }
+  }
+
+  void on(const Event& event) {
+    if (const auto* request = std::get_if<RequestAccepted>(&event)) {
+      accepted.push_back(request->request.sequence);
+      scan_done_at = now + 1s;
+      next_result.part_id = request->request.part_id;
+    }
+    if (std::holds_alternative<CycleAborted>(event) || std::holds_alternative<CycleTimedOut>(event)) {
+      ++aborted;
+      scan_done_at.reset();
+      result_at.reset();
+    }
+    resets += std::holds_alternative<ResetRaised>(event);
+    lost += std::holds_alternative<PlcLost>(event);
+    back += std::holds_alternative<PlcBack>(event);
+  }
+
+  ConnectionId id_ = 0;
+  bool connected_ = false;
+  TimePoint reconnect_at_{};
+};
+}  // namespace binpick::plc::test
