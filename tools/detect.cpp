@@ -1,0 +1,153 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "base/rotation.hpp"
+#include "tools/commands.hpp"
+#include "vision/cloud.hpp"
+#include "vision/detector.hpp"
+#include "vision/draw.hpp"
+
+namespace binpick::tools {
+namespace {
+struct DetectArguments {
+  std::string part, scene, json, image;
+  int max = 0, repeat = 1, threads = 2;
+  int deadline_ms = 0;
+};
+
+nlohmann::json rows_of(const Eigen::MatrixXd& matrix) {
+  nlohmann::json rows = nlohmann::json::array();
+  for (Eigen::Index r = 0; r < matrix.rows(); ++r) {
+    nlohmann::json row = nlohmann::json::array();
+    for (Eigen::Index c = 0; c < matrix.cols(); ++c) row.push_back(matrix(r, c));
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+nlohmann::json to_json(const std::string& part, const vision::DetectionReport& report) {
+  nlohmann::json json{{"part", part},
+                      {"time_ms", report.time_ms},
+                      {"stages_ms", report.stages_ms},
+                      {"maxima", report.maxima},
+                      {"hypotheses", report.hypotheses},
+                      {"detections", nlohmann::json::array()},
+                      {"rejected", nlohmann::json::array()}};
+  for (const vision::Detection& d : report.detections)
+    json["detections"].push_back({{"score", d.score},
+                                  {"T_supply_object", rows_of(d.T_supply_object.iso.matrix())},
+                                  {"visible_fraction", d.visible_fraction},
+                                  {"covariance", rows_of(d.covariance)}});
+  for (const vision::Rejection& r : report.rejected)
+    json["rejected"].push_back(
+        {{"score", r.score}, {"T_supply_object", rows_of(r.T_supply_object.iso.matrix())}, {"reason", r.reason}});
+  return json;
+}
+
+void print_table(const vision::DetectionReport& report) {
+  if (report.detections.empty()) {
+    std::printf("nothing found\n");
+  } else {
+    std::printf("  #  score  seen    x mm    y mm    z mm   W deg   P deg   R deg  sd mm  sd deg\n");
+    for (std::size_t k = 0; k < report.detections.size(); ++k) {
+      const vision::Detection& d = report.detections[k];
+      const Eigen::Vector3d t = d.T_supply_object.iso.translation();
+      const Eigen::Vector3d wpr = to_wpr_deg(d.T_supply_object.iso.linear());
+      const double sd_mm = std::sqrt(d.covariance.topLeftCorner<3, 3>().trace() / 3);
+      const double sd_deg = std::sqrt(d.covariance.bottomRightCorner<3, 3>().trace() / 3) * 180 / std::numbers::pi;
+      std::printf("%3zu  %5.3f  %3.0f%% %7.1f %7.1f %7.1f %7.1f %7.1f %7.1f %6.2f %7.2f\n", k + 1, d.score,
+                  100 * d.visible_fraction, t.x(), t.y(), t.z(), wpr.x(), wpr.y(), wpr.z(), sd_mm, sd_deg);
+    }
+  }
+  for (const vision::Rejection& r : report.rejected) {
+    const Eigen::Vector3d t = r.T_supply_object.iso.translation();
+    std::printf("  rejected at %.0f %.0f %.0f: %s\n", t.x(), t.y(), t.z(), r.reason.c_str());
+  }
+  std::printf("%zu maxima, %zu hypotheses, %.1f ms (", report.maxima, report.hypotheses, report.time_ms);
+  const char* separator = "";
+  for (const auto& [stage, ms] : report.stages_ms) {
+    std::printf("%s%s %.1f", separator, stage.c_str(), ms);
+    separator = ", ";
+  }
+  std::printf(")\n");
+}
+
+int complain(int status, const std::string& text) {
+  std::fprintf(stderr, "binpick detect: %s\n", text.c_str());
+  return status;
+}
+
+int run(const DetectArguments& arguments) {
+  const auto part = vision::KnowledgeBase::open(arguments.part);
+  if (!part) return complain(2, part.error().text);
+  const auto points = vision::load_cloud(arguments.scene);
+  if (!points) return complain(2, points.error().text);
+
+  vision::DetectorOptions options;
+  options.threads = arguments.threads;
+  options.detections_max = arguments.max;
+  if (arguments.deadline_ms > 0) options.deadline = std::chrono::milliseconds{arguments.deadline_ms};
+
+  vision::DetectionReport report;
+  vision::DepthImage image;
+  std::vector<double> times_ms;
+  for (int k = 0; k < arguments.repeat; ++k) {
+    const auto start = std::chrono::steady_clock::now();
+    const vision::DepthWindow window = vision::window_of(*points);
+    vision::DepthImageBuilder builder{part->pixel_mm(), window.min_mm, window.max_mm};
+    builder.add(*points);
+    image = builder.image();
+    const double image_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    report = vision::detect(image, {}, *part, options);
+    report.stages_ms["depth image"] = image_ms;
+    report.time_ms += image_ms;
+    times_ms.push_back(report.time_ms);
+  }
+
+  if (!arguments.image.empty())
+    if (const auto drawn = vision::draw_report(arguments.image, image, *part, report); !drawn)
+      return complain(1, drawn.error());
+  const std::string json = to_json(part->part_name(), report).dump(2);
+  if (arguments.json == "-") {
+    std::printf("%s\n", json.c_str());
+    return 0;
+  }
+  if (!arguments.json.empty()) {
+    std::ofstream out{arguments.json};
+    out << json << '\n';
+    if (!out.flush())
+      return complain(1, arguments.json + ": cannot be written; check that the folder exists and has room");
+  }
+  print_table(report);
+  if (arguments.repeat > 1) {
+    std::sort(times_ms.begin(), times_ms.end());
+    std::printf("%d runs: median %.1f ms, best %.1f ms, worst %.1f ms\n", arguments.repeat,
+                times_ms[times_ms.size() / 2], times_ms.front(), times_ms.back());
+  }
+  return 0;
+}
+}  // namespace
+
+void add_detect(CLI::App& app, int& exit_status) {
+  auto arguments = std::make_shared<DetectArguments>();
+  CLI::App* command = app.add_subcommand("detect", "detect a trained part in a point cloud");
+  command->add_option("PART.kb", arguments->part, "knowledge base, made by `binpick train`")->required();
+  command->add_option("SCENE.ply", arguments->scene, "point cloud, millimetres, supply frame")->required();
+  command->add_option("--json", arguments->json, "write the whole report here; - is stdout, without the table");
+  command->add_option("--image", arguments->image, "draw the detections over the depth image (PNG)");
+  command->add_option("--max", arguments->max, "report at most so many detections (default: all)")
+      ->check(CLI::Range(1, 1'000'000));
+  command->add_option("--repeat", arguments->repeat, "detect so many times and say how long it took")
+      ->check(CLI::Range(1, 100'000));
+  command->add_option("--threads", arguments->threads, "threads; the result does not depend on it (default: 2)")
+      ->check(CLI::Range(1, 64));
+  command->add_option("--deadline-ms", arguments->deadline_ms, "return the best found after so long")
+      ->check(CLI::Range(1, 3'600'000));
+  command->callback([arguments, &exit_status] { exit_status = run(*arguments); });
+}
+}  // namespace binpick::tools
