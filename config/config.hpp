@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/expected.hpp"
@@ -92,6 +93,9 @@ std::string to_string(const Diagnostic& diagnostic);
 Expected<Config, std::vector<Diagnostic>> load(const std::string& path);
 /// The same for one PART.toml.
 Expected<Part, std::vector<Diagnostic>> load_part(const std::string& path);
+/// The same from text in memory. `path` names it in findings, and paths in it are relative to that one's folder.
+Expected<Config, std::vector<Diagnostic>> load_text(const std::string& path, std::string_view text);
+Expected<Part, std::vector<Diagnostic>> load_part_text(const std::string& path, std::string_view text);
 
 /// Keys whose change takes effect only with a restart, by name ("plc.listen"), of those that differ between two files.
 std::vector<std::string> needs_restart(const Config& running, const Config& edited);

@@ -83,6 +83,7 @@ std::string remedy(const std::string& what) {
   if (says("table header")) return "write [name] or [[name]] alone on its line";
   if (says("inline table")) return "keep { … } on one line and end it with }, with no comma before it";
   if (says("array")) return "separate values by commas and end the list with ]";
+  if (says("expected value")) return "write a value after the =";
   if (says("end-of-file")) return "complete what begins on this line";
   if (says("saw ','")) return "write decimals with a point, 1.5, and lists in [ ]";
   if (says("control characters")) return "end the text with its quote, on the same line";
@@ -101,6 +102,17 @@ std::string remedy(const std::string& what) {
 bool ends_with_line(const std::string& what) {
   const auto says = [&](const char* words) { return what.find(words) != std::string::npos; };
   return !says("parsing array") && !says("inline table") && !says("table header") && !says("multi-line");
+}
+
+/// From a place to the end of the word or number there, for the tildes.
+int token_length(const std::vector<std::string>& lines, const Place& place) {
+  if (place.line < 1 || static_cast<std::size_t>(place.line) > lines.size()) return 1;
+  const std::string& line = lines[static_cast<std::size_t>(place.line) - 1];
+  std::size_t at = 0;
+  for (int column = 1; column < place.column && at < line.size(); ++column)
+    at += std::max<std::size_t>(1, utf8_bytes(line, at));
+  const std::size_t end = std::min(line.find_first_of(" \t,=[]{}#\"'", at), line.size());
+  return std::max(1, static_cast<int>(characters(std::string_view{line}.substr(at, end - at))));
 }
 
 /// The name before the '=' of a line, without quotes.
@@ -216,9 +228,12 @@ Document parse(const std::string& file, std::string_view text) {
         std::min(static_cast<std::size_t>(std::max(place.line, 1)), std::max<std::size_t>(kept.size(), 1)) - 1;
     place.line = static_cast<int>(at) + 1;
     const bool skips = recoveries < kRecoveriesMax && at < kept.size() && !kept[at].empty() && ends_with_line(what);
+    const std::string cure = remedy(what);
     if (const auto colon = what.find("Error while parsing "); colon == 0)
       what.erase(0, std::strlen("Error while parsing "));
-    findings.add(place, printable(what) + "; " + remedy("parsing " + what));
+    if (what == "value: could not determine value type") what = "this is no TOML value";
+    place.length = token_length(kept, place);
+    findings.add(place, printable(what) + "; " + cure);
     if (!skips) {
       document.usable = false;
       break;
@@ -247,7 +262,7 @@ Document open(const std::string& path) {
     problem = "is not a regular file; name a TOML file";
   } else if (static_cast<std::size_t>(status.st_size) > kFileBytesMax) {
     problem = "has " + std::to_string(status.st_size / 1024) + " KiB, more than " +
-              std::to_string(kFileBytesMax / 1024) + "; is it the right file?";
+              std::to_string(kFileBytesMax / 1024) + " KiB; is it the right file?";
   } else {
     char buffer[16384];
     ssize_t n = 0;

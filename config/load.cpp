@@ -1,4 +1,5 @@
 #include <filesystem>
+#include <limits>
 #include <map>
 
 #include "config/config.hpp"
@@ -202,16 +203,8 @@ CellPlaces read_cell(const Document& document, Config& config, std::vector<std::
   }
   return places;
 }
-}  // namespace
 
-bool operator==(const Supply& a, const Supply& b) {
-  return a.id == b.id && a.name == b.name && a.size_mm == b.size_mm &&
-         a.T_base_supply.iso.matrix() == b.T_base_supply.iso.matrix() && a.sweep_start == b.sweep_start &&
-         a.sweep_end == b.sweep_end && a.sweep_speed_rad_s == b.sweep_speed_rad_s;
-}
-
-Expected<Config, std::vector<Diagnostic>> load(const std::string& path) {
-  Document document = open(path);
+Expected<Config, std::vector<Diagnostic>> load_document(const std::string& path, Document document) {
   if (!document.usable) return unexpected(std::move(document.findings));
   Config config;
   config.path = path;
@@ -225,7 +218,9 @@ Expected<Config, std::vector<Diagnostic>> load(const std::string& path) {
 
   auto all = findings.take();
   all.insert(all.end(), document.findings.begin(), document.findings.end());
-  std::stable_sort(all.begin(), all.end(), [](const Diagnostic& a, const Diagnostic& b) { return a.line < b.line; });
+  // What is said of the file as a whole (line 0) comes last.
+  const auto order = [](const Diagnostic& d) { return d.line == 0 ? std::numeric_limits<int>::max() : d.line; };
+  std::stable_sort(all.begin(), all.end(), [&](const auto& a, const auto& b) { return order(a) < order(b); });
   all.insert(all.end(), of_parts.begin(), of_parts.end());
   if (!all.empty()) return unexpected(std::move(all));
 
@@ -236,11 +231,27 @@ Expected<Config, std::vector<Diagnostic>> load(const std::string& path) {
   return config;
 }
 
-Expected<Part, std::vector<Diagnostic>> load_part(const std::string& path) {
+Expected<Part, std::vector<Diagnostic>> load_part_document(Document document) {
   Part part;
-  auto findings = read_part(open(path), part);
+  auto findings = read_part(std::move(document), part);
   if (!findings.empty()) return unexpected(std::move(findings));
   return part;
+}
+}  // namespace
+
+bool operator==(const Supply& a, const Supply& b) {
+  return a.id == b.id && a.name == b.name && a.size_mm == b.size_mm &&
+         a.T_base_supply.iso.matrix() == b.T_base_supply.iso.matrix() && a.sweep_start == b.sweep_start &&
+         a.sweep_end == b.sweep_end && a.sweep_speed_rad_s == b.sweep_speed_rad_s;
+}
+
+Expected<Config, std::vector<Diagnostic>> load(const std::string& path) { return load_document(path, open(path)); }
+Expected<Part, std::vector<Diagnostic>> load_part(const std::string& path) { return load_part_document(open(path)); }
+Expected<Config, std::vector<Diagnostic>> load_text(const std::string& path, std::string_view text) {
+  return load_document(path, parse(path, text));
+}
+Expected<Part, std::vector<Diagnostic>> load_part_text(const std::string& path, std::string_view text) {
+  return load_part_document(parse(path, text));
 }
 
 std::vector<std::string> needs_restart(const Config& running, const Config& edited) {

@@ -1,0 +1,97 @@
+#pragma once
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <unistd.h>
+
+#include "config/config.hpp"
+
+/// A folder with a good cell file, for tests that spoil it.
+namespace binpick::config {
+inline std::string read_text(const std::string& path) {
+  std::ifstream file{path, std::ios::binary};
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+inline std::string in_source(const std::string& name) { return std::string{BINPICK_SOURCE_DIR} + "/" + name; }
+
+/// A folder of its own, removed at the end: the example cell as `cell.toml`, its part and an (empty) mesh.
+class CellFolder {
+ public:
+  CellFolder() {
+    std::string name = (std::filesystem::temp_directory_path() / "binpick-config-XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
+    folder_ = name;
+    cell = read_text(in_source("config/cell.example.toml"));
+    part = read_text(in_source("config/part.example.toml"));
+    write("track_link.stl", "");
+  }
+  ~CellFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(folder_, ignored);
+  }
+  CellFolder(const CellFolder&) = delete;
+  CellFolder& operator=(const CellFolder&) = delete;
+
+  std::string path(const std::string& name) const { return folder_ + "/" + name; }
+  void write(const std::string& name, const std::string& text) const {
+    std::ofstream{path(name), std::ios::binary} << text;
+  }
+  /// Puts `to` in the place of the first `from`; a test that finds nothing to replace is wrong itself.
+  CellFolder& edit(const std::string& from, const std::string& to) {
+    replace(cell, from, to);
+    return *this;
+  }
+  CellFolder& edit_part(const std::string& from, const std::string& to) {
+    replace(part, from, to);
+    return *this;
+  }
+  Expected<Config, std::vector<Diagnostic>> load() const {
+    write("cell.toml", cell);
+    write("track_link.toml", part);
+    return config::load(path("cell.toml"));
+  }
+  /// "line:column: message" of each finding, one line each; of other files "name:line:column: …". Empty: a good file.
+  std::string findings() const {
+    const auto loaded = load();
+    if (loaded) return {};
+    std::string text;
+    for (const auto& d : loaded.error()) {
+      const std::string name = std::filesystem::path{d.file}.filename().string();
+      std::string message = d.message;
+      for (std::size_t at = 0; (at = message.find(folder_ + "/")) != std::string::npos;)
+        message.erase(at, folder_.size() + 1);
+      text += (name == "cell.toml" ? "" : name + ":") + std::to_string(d.line) + ":" + std::to_string(d.column) + ": " +
+              message + "\n";
+    }
+    return text;
+  }
+  /// The line of the cell file that begins with `start`.
+  int line_of(const std::string& start) const {
+    int line = 1;
+    for (std::size_t at = 0; at < cell.size(); ++line) {
+      if (cell.compare(at, start.size(), start) == 0) return line;
+      at = cell.find('\n', at);
+      if (at == std::string::npos) break;
+      ++at;
+    }
+    throw std::runtime_error("no line begins with " + start);
+  }
+
+  std::string cell;
+  std::string part;
+
+ private:
+  static void replace(std::string& text, const std::string& from, const std::string& to) {
+    const std::size_t at = text.find(from);
+    if (at == std::string::npos) throw std::runtime_error("nothing to replace: " + from);
+    text.replace(at, from.size(), to);
+  }
+
+  std::string folder_;
+};
+}  // namespace binpick::config

@@ -1,0 +1,319 @@
+#include <cmath>
+#include <gtest/gtest.h>
+
+#include "tests/unit/config/cell_files.hpp"
+
+namespace binpick::config {
+namespace {
+using namespace std::chrono_literals;
+
+TEST(Load, ExampleCellIsGoodAndInInnerUnits) {
+  const CellFolder folder;
+  const auto loaded = folder.load();
+  ASSERT_TRUE(loaded.has_value()) << folder.findings();
+  const Config& c = *loaded;
+  EXPECT_EQ(c.name, "demo");
+  EXPECT_EQ(c.plc_listen, "0.0.0.0:502");
+  EXPECT_EQ(c.plc.word_order, plc::WordOrder::HighWordFirst);
+  EXPECT_EQ(c.plc.allow, std::vector<std::string>{"192.168.0.10"});
+  EXPECT_EQ(c.plc.heartbeat_timeout, 3000ms);
+  EXPECT_EQ(c.plc.part_ids, std::vector<std::uint16_t>{1});
+  EXPECT_EQ(c.plc.supply_ids, std::vector<std::uint16_t>{1});
+  EXPECT_EQ(c.pivot_can, "can0");
+  EXPECT_EQ(c.pivot.module_id, 12);
+  EXPECT_EQ(c.pivot.reference_timeout, 30s);
+  EXPECT_EQ(c.scanner.frequency_hz, 360);
+  EXPECT_NEAR(c.scanner.start.in_deg(), 70, 1e-12);
+  EXPECT_EQ(c.robot_listen, "0.0.0.0:5002");
+  EXPECT_NEAR(c.reach.tilt_max_rad, 40 * M_PI / 180, 1e-12);
+  ASSERT_EQ(c.supplies.size(), 1U);
+  EXPECT_EQ(c.supplies[0].size_mm, Eigen::Vector3d(1000, 800, 500));
+  EXPECT_NEAR(c.supplies[0].sweep_speed_rad_s, 34 * M_PI / 180, 1e-12);
+  ASSERT_EQ(c.recipes.size(), 1U);
+  EXPECT_EQ(c.recipes[0].part.mesh_path, folder.path("track_link.stl"));
+  EXPECT_EQ(c.recipes[0].part.options.name, "track_link");
+  EXPECT_EQ(c.recipes[0].part.options.scanner, vision::ScannerClass::Lms400);
+  EXPECT_FALSE(c.recipes[0].part.options.pixel_mm.has_value());
+  EXPECT_EQ(c.recipes[0].knowledge_base, folder.path("track_link.kb"));
+  EXPECT_FALSE(c.recipes[0].tilt_max_rad.has_value());
+  ASSERT_EQ(c.recipes[0].part.grasps.size(), 1U);
+  EXPECT_EQ(c.state_dir, "/var/lib/binpick");
+  EXPECT_EQ(c.picture_dir, "");
+}
+
+TEST(Load, RotationsAreAboutFixedAxesXThenYThenZ) {
+  CellFolder folder;
+  folder.edit("T_base_pivot = { xyz_mm = [1200, 0, 1860], rpy_deg = [0, 90, 0] }",
+              "T_base_pivot = { xyz_mm = [1, 2, 3], rpy_deg = [90, 0, 90] }");
+  const auto loaded = folder.load();
+  ASSERT_TRUE(loaded.has_value()) << folder.findings();
+  // x is turned to y by the last turn; y to z by the first, which the last leaves alone; z to -y to x.
+  Eigen::Matrix3d expected;
+  expected << 0, 0, 1, 1, 0, 0, 0, 1, 0;
+  const auto& T = loaded->mount.T_base_pivot.iso;
+  EXPECT_TRUE(T.linear().isApprox(expected, 1e-12)) << T.matrix();
+  EXPECT_EQ(T.translation(), Eigen::Vector3d(1, 2, 3));
+}
+
+TEST(Load, AbsentKeysHaveTheTablesDefaults) {
+  CellFolder folder;
+  folder.cell = R"([pivot]
+can = "cannelloni://10.0.0.2:20000"
+T_base_pivot = { xyz_mm = [0, 0, 0], rpy_deg = [0, 0, 0] }
+[scanner]
+model = "lms400"
+address = "[fd00::1]:2111"
+T_pivot_scanner = { xyz_mm = [0, 0, 0], rpy_deg = [0, 0, 0] }
+[[supply]]
+id = 7
+size_mm = [100, 100, 100.5]
+T_base_supply = { xyz_mm = [0, 0, 0], rpy_deg = [0, 0, 0] }
+sweep_start_deg = -10
+sweep_end_deg = 10
+[[part]]
+id = 9
+file = "track_link.toml"
+knowledge_base = "/kb/track_link.kb"
+tilt_max_deg = 30
+)";
+  const auto loaded = folder.load();
+  ASSERT_TRUE(loaded.has_value()) << folder.findings();
+  EXPECT_EQ(loaded->robot_listen, "");
+  EXPECT_EQ(loaded->scanner.range.in_deg(), 70);
+  EXPECT_EQ(loaded->plc.detect_timeout, 5000ms);
+  EXPECT_EQ(loaded->detection.deadline, 3000ms);
+  EXPECT_EQ(loaded->recipes[0].knowledge_base, "/kb/track_link.kb");
+  EXPECT_NEAR(*loaded->recipes[0].tilt_max_rad, M_PI / 6, 1e-12);
+  EXPECT_EQ(loaded->supplies[0].size_mm.z(), 100.5);
+}
+
+struct Mistake {
+  const char* from;
+  const char* to;
+  const char* at;  ///< Start of the line of the finding, in the spoiled file.
+  int column;
+  const char* message;
+};
+class OneMistake : public testing::TestWithParam<Mistake> {};
+
+TEST_P(OneMistake, OneFindingWithPlaceAndRemedy) {
+  CellFolder folder;
+  folder.edit(GetParam().from, GetParam().to);
+  EXPECT_EQ(folder.findings(), std::to_string(folder.line_of(GetParam().at)) + ":" + std::to_string(GetParam().column) +
+                                   ": " + GetParam().message + "\n");
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Keys, OneMistake,
+    testing::Values(
+        Mistake{"frequency_hz = 360", "frequncy_hz = 360", "frequncy_hz", 1,
+                "unknown key \"frequncy_hz\" in [scanner]; did you mean \"frequency_hz\"?"},
+        Mistake{"frequency_hz = 360", "speed = 3", "speed", 1,
+                "unknown key \"speed\" in [scanner]; remove it, or look the name up in docs/configuration.md"},
+        Mistake{"[reach]", "[raech]", "[raech]", 2, "unknown section \"raech\"; did you mean \"reach\"?"},
+        Mistake{"[cell]", "threads = 2\n[cell]", "threads", 1,
+                "unknown key \"threads\" before any section; put it under [detection]"},
+        Mistake{"frequency_hz = 360", "frequency_hz = 149.9", "frequency_hz", 16,
+                "scanner.frequency_hz = 149.9 is outside 150 … 500; use at least 150"},
+        Mistake{"frequency_hz = 360", "frequency_hz = nan", "frequency_hz", 16,
+                "scanner.frequency_hz = nan is not a finite number; give one within 150 … 500"},
+        Mistake{"frequency_hz = 360", "frequency_hz = -inf", "frequency_hz", 16,
+                "scanner.frequency_hz = -inf is not a finite number; give one within 150 … 500"},
+        Mistake{"frequency_hz = 360", "frequency_hz = \"360\"", "frequency_hz", 16,
+                "scanner.frequency_hz = \"360\" is not a number; write it as frequency_hz = 360"},
+        Mistake{"filter_mask = 0", "filter_mask = 1.5", "filter_mask", 15,
+                "scanner.filter_mask = 1.5 is not a whole number; write it as filter_mask = 0"},
+        Mistake{"extended_remission = false", "extended_remission = 0", "extended_remission", 22,
+                "scanner.extended_remission = 0 is not a flag; write it as extended_remission = false"},
+        Mistake{"model = \"lms400\"", "model = \"lms511\"", "model", 9,
+                "scanner.model = \"lms511\" is not \"lms400\"; use \"lms400\""},
+        Mistake{"model = \"lms400\"\n", "", "[scanner]", 1,
+                "scanner.model is missing in [scanner]; add, for example: model = \"lms400\""},
+        Mistake{"address = \"192.168.0.1:2111\"", "address = \"192.168.0.1\"", "address", 11,
+                "scanner.address = \"192.168.0.1\" has no port; write it as host:port"},
+        Mistake{"address = \"192.168.0.1:2111\"", "address = \"192.168.0.300:2111\"", "address", 11,
+                "scanner.address = \"192.168.0.300:2111\" has no valid IPv4 address; it has four numbers of 0 … 255"},
+        Mistake{"address = \"192.168.0.1:2111\"", "address = \"scanner:99999\"", "address", 11,
+                "scanner.address = \"scanner:99999\" has the port \"99999\"; give a number of 1 … 65535"},
+        Mistake{"address = \"192.168.0.1:2111\"", "address = \"fd00::1:2111\"", "address", 11,
+                "scanner.address = \"fd00::1:2111\" has a host with colons; put an IPv6 address in brackets, "
+                "[address]:port"},
+        Mistake{"allow = [\"192.168.0.10\"]", "allow = [\"192.168.0.10\", \"plc1\"]", "allow", 26,
+                "plc.allow: \"plc1\" is no IP address; write each as \"192.168.0.10\""},
+        Mistake{"can = \"can0\"", "can = \"slcan://x\"", "can = ", 7,
+                "pivot.can = \"slcan://x\" has an unknown scheme; use cannelloni://HOST:PORT"},
+        Mistake{
+            "can = \"can0\"", "can = \"an_interface_far_too_long\"", "can = ", 7,
+            "pivot.can = \"an_interface_far_too_long\" is no network interface; use can0 or cannelloni://HOST:PORT"},
+        Mistake{"size_mm = [1000, 800, 500]", "size_mm = [1000, 800]", "size_mm", 11,
+                "supply.size_mm is a list of 2; give three numbers, [x, y, z]"},
+        Mistake{"size_mm = [1000, 800, 500]", "size_mm = [1000, -800, 500]", "size_mm", 18,
+                "supply.size_mm[1] = -800 is outside 10 … 5000; use at least 10"}));
+
+TEST(Load, KeysOfATransformAreCheckedOneByOne) {
+  CellFolder folder;
+  folder.edit("xyz_mm = [60, 0, 0], rpy_deg", "xyz_m = [0.06, 0, 0], rpy_deg");
+  const std::string line = std::to_string(folder.line_of("T_pivot_scanner"));
+  EXPECT_EQ(folder.findings(), line + ":19: scanner.T_pivot_scanner has no xyz_mm; add xyz_mm = [x, y, z]\n" + line +
+                                   ":21: unknown key \"xyz_m\" in scanner.T_pivot_scanner; did you mean \"xyz_mm\"?\n");
+}
+
+INSTANTIATE_TEST_SUITE_P(Sections, OneMistake,
+                         testing::Values(Mistake{"[[supply]]", "[supply]", "[supply]", 1,
+                                                 "[supply] is a list; write it in double brackets, [[supply]]"},
+                                         Mistake{"[pivot]", "[[pivot]]", "[[pivot]]", 3,
+                                                 "[[pivot]] stands for one thing only; write [pivot]"}));
+
+INSTANTIATE_TEST_SUITE_P(
+    AcrossKeys, OneMistake,
+    testing::Values(
+        Mistake{
+            "range_deg = 40", "range_deg = 55.5", "range_deg", 13,
+            "scanner.start_deg + scanner.range_deg = 125.5 is beyond the field of view, 55 … 125; use range_deg = 55 "
+            "at most"},
+        Mistake{"sample_period_ms = 10", "sample_period_ms = 100.5", "sample_period_ms", 20,
+                "pivot.sample_period_ms = 100.5 is not a whole number; write it as sample_period_ms = 10"},
+        Mistake{"setpoint_horizon_ms = 200", "setpoint_horizon_ms = 19", "setpoint_horizon_ms", 23,
+                "pivot.setpoint_horizon_ms = 19 is outside 20 … 2000; use at least 20"},
+        Mistake{"can_listen_port = 0", "can_listen_port = 20000", "can_listen_port", 19,
+                "pivot.can_listen_port is for cannelloni, but pivot.can is a network interface; remove it"},
+        Mistake{"detect_timeout_ms = 5000", "detect_timeout_ms = 3000", "deadline_ms", 15,
+                "detection.deadline_ms = 3000 is not shorter than plc.detect_timeout_ms = 3000; use less, or a longer "
+                "time-out"},
+        Mistake{
+            "heartbeat_timeout_ms = 3000", "heartbeat_timeout_ms = 50", "heartbeat_timeout_ms", 24,
+            "plc.heartbeat_timeout_ms = 50 is shorter than a PLC's cycle may be; use 0 (not watched) or at least 100"},
+        Mistake{"listen = \"0.0.0.0:5002\"", "listen = \"127.0.0.1:502\"", "listen = \"127", 10,
+                "robot.listen has the same port as plc.listen, 502; use another, such as 5002"},
+        Mistake{"sweep_end_deg = 16", "sweep_end_deg = -16.5", "sweep_end_deg", 17,
+                "supply.sweep_end_deg is 0.5 deg from sweep_start_deg, that is no sweep; use at least 1"},
+        Mistake{
+            "sweep_speed_deg_s = 34", "sweep_speed_deg_s = 2", "sweep_speed_deg_s", 21,
+            "supply: the sweep takes 16 s, not less than plc.scan_timeout_ms = 15000; sweep faster, or use a longer "
+            "time-out"},
+        Mistake{"sweep_end_deg = 16", "sweep_end_deg = -14.5", "sweep_speed_deg_s", 21,
+                "supply: the sweep gives 15 profiles; sweep slower or farther, 20 are the least"}));
+
+TEST(Load, APivotThatWouldHaltBetweenSetPointsIsRefused) {
+  CellFolder folder;
+  folder.edit("sample_period_ms = 10", "sample_period_ms = 60")
+      .edit("setpoint_horizon_ms = 200", "setpoint_horizon_ms = 100");
+  EXPECT_EQ(folder.findings(),
+            std::to_string(folder.line_of("setpoint_horizon_ms")) +
+                ":23: pivot.setpoint_horizon_ms = 100 is less than two sample periods of 60 ms, the pivot "
+                "would halt between set-points; use at least 120\n");
+}
+
+TEST(Load, EntriesThatAreMissingAreSaidAtTheEndOfTheFile) {
+  CellFolder folder;
+  folder.cell = "[cell]\nname = \"empty\"\n";
+  EXPECT_EQ(folder.findings(),
+            "2:1: section [pivot] is missing; add it, with can, T_base_pivot\n"
+            "2:1: section [scanner] is missing; add it, with model, address, T_pivot_scanner\n"
+            "2:1: there is no [[supply]]; add one for each charge carrier\n"
+            "2:1: there is no [[part]]; add one for each part that the PLC can ask for\n");
+}
+
+TEST(Load, IdsAreUnique) {
+  CellFolder folder;
+  folder.cell += "[[part]]\nid = 1\nfile = \"track_link.toml\"\nknowledge_base = \"b.kb\"\n";
+  const int last = folder.line_of("[[part]]") + 20;
+  ASSERT_GT(last, 0);
+  const std::string findings = folder.findings();
+  EXPECT_NE(findings.find(": part.id = 1 stands also in line "), std::string::npos) << findings;
+  EXPECT_EQ(std::count(findings.begin(), findings.end(), '\n'), 1) << findings;
+}
+
+TEST(Load, AThousandMistakesAreCutShort) {
+  CellFolder folder;
+  for (int i = 0; i < 1000; ++i) folder.cell += "bad" + std::to_string(i) + " = 1\n";
+  const auto loaded = folder.load();
+  ASSERT_FALSE(loaded.has_value());
+  EXPECT_EQ(loaded.error().size(), 101U);
+  EXPECT_EQ(loaded.error().back().message, "900 more findings are not shown; correct these first");
+}
+
+TEST(Part, FindingsNameThePartFile) {
+  CellFolder folder;
+  folder.edit_part("mesh = \"track_link.stl\"", "mesh = \"gone.stl\"")
+      .edit_part("approach_mm = 100", "aproach_mm = 100");
+  EXPECT_EQ(folder.findings(),
+            "track_link.toml:7:8: mesh: there is no file gone.stl; give its path from the folder of this file\n"
+            "track_link.toml:43:1: unknown key \"aproach_mm\" in [[grasp]]; did you mean \"approach_mm\"?\n");
+}
+
+TEST(Part, APartWithoutGraspCannotBePickedButTrained) {
+  CellFolder folder;
+  folder.part = "mesh = \"track_link.stl\"\n";
+  EXPECT_EQ(folder.findings(),
+            std::to_string(folder.line_of("file = ")) +
+                ":8: part.file: track_link.toml has no [[grasp]], so nothing can be picked; add one\n");
+  const auto part = load_part(folder.path("track_link.toml"));
+  ASSERT_TRUE(part.has_value());
+  EXPECT_EQ(part->options.name, "track_link");
+  EXPECT_EQ(part->mesh_unit_mm, 1);
+  EXPECT_FALSE(part->options.symmetry.has_value());
+}
+
+TEST(Part, SymmetryIsMadeFromItsKind) {
+  CellFolder folder;
+  const auto symmetry = [&](const std::string& keys) {
+    const auto part = load_part_text(folder.path("p.toml"), "mesh = \"track_link.stl\"\n[symmetry]\n" + keys);
+    EXPECT_TRUE(part.has_value()) << (part ? "" : part.error().front().message);
+    return part ? part->options.symmetry.value() : vision::Symmetry{};
+  };
+  using Kind = vision::Symmetry::Kind;
+  EXPECT_EQ(symmetry("kind = \"none\"").kind, Kind::None);
+  EXPECT_EQ(symmetry("kind = \"revolution\"\naxis = [0, 1, 0]").axis, Eigen::Vector3d::UnitY());
+  EXPECT_EQ(symmetry("kind = \"sphere\"\ncentre_mm = [1, 2, 3]").centre_mm, Eigen::Vector3d(1, 2, 3));
+  const auto cyclic = symmetry("kind = \"cyclic\"\nfold = 3");
+  EXPECT_EQ(cyclic.kind, Kind::Finite);
+  ASSERT_EQ(cyclic.rotations.size(), 3U);
+  EXPECT_TRUE(cyclic.rotations[0].isIdentity());
+  EXPECT_TRUE((cyclic.rotations[1] * cyclic.rotations[2]).isIdentity(1e-12));
+  const auto dihedral = symmetry("kind = \"dihedral\"\nfold = 2");
+  ASSERT_EQ(dihedral.rotations.size(), 4U);
+  for (const auto& a : dihedral.rotations) {
+    EXPECT_NEAR(a.determinant(), 1, 1e-12);
+    for (const auto& b : dihedral.rotations)
+      EXPECT_TRUE(std::any_of(dihedral.rotations.begin(), dihedral.rotations.end(), [&](const auto& c) {
+        return c.isApprox(a * b, 1e-9);
+      })) << "not closed";
+  }
+  const auto skew = load_part_text(
+      folder.path("p.toml"), "mesh = \"track_link.stl\"\n[symmetry]\nkind = \"dihedral\"\nflip_axis = [0, 1, 1]\n");
+  ASSERT_FALSE(skew.has_value());
+  EXPECT_EQ(skew.error().front().message,
+            "symmetry.flip_axis is not at right angles to symmetry.axis; use one that is");
+}
+
+TEST(Part, UnitsOfTheMesh) {
+  const CellFolder folder;
+  const auto part = load_part_text(folder.path("p.toml"),
+                                   "mesh = \"track_link.stl\"\nmesh_unit = \"inch\"\npicking = \"conveyor\"\n");
+  ASSERT_TRUE(part.has_value());
+  EXPECT_EQ(part->mesh_unit_mm, 25.4);
+  EXPECT_TRUE(part->conveyor);
+}
+
+TEST(NeedsRestart, NamesTheKeysThatDiffer) {
+  CellFolder folder;
+  const auto before = folder.load();
+  ASSERT_TRUE(before.has_value());
+  EXPECT_EQ(needs_restart(*before, *before), std::vector<std::string>{});
+  folder.edit("listen = \"0.0.0.0:502\"", "listen = \"0.0.0.0:1502\"")
+      .edit("frequency_hz = 360", "frequency_hz = 300")
+      .edit("can = \"can0\"", "can = \"can1\"")
+      .edit("word_order = \"s7\"", "word_order = \"logix\"")
+      .edit("tilt_max_deg = 40", "tilt_max_deg = 30")
+      .edit("size_mm = [1000, 800, 500]", "size_mm = [900, 800, 500]")
+      .edit("heartbeat_timeout_ms = 3000", "heartbeat_timeout_ms = 2000");
+  const auto after = folder.load();
+  ASSERT_TRUE(after.has_value()) << folder.findings();
+  EXPECT_EQ(needs_restart(*before, *after),
+            (std::vector<std::string>{"plc.listen", "plc.word_order", "pivot.can", "scanner.frequency_hz"}));
+  EXPECT_FALSE(before->supplies[0] == after->supplies[0]);
+  EXPECT_TRUE(before->supplies[0] == before->supplies[0]);
+}
+}  // namespace
+}  // namespace binpick::config
