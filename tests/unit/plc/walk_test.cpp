@@ -181,7 +181,10 @@ class Walk {
     auto words = words_;
     ++words[0];
     sequence_ = sequence_ == 65535 ? 1 : static_cast<std::uint16_t>(sequence_ + 1);
-    if (sequence_ == 1) accepted_.clear(), outcomes_.clear(), published_.clear();  // numbers wrap
+    // Numbers wrap: whoever had it before is long forgotten.
+    accepted_.erase({boot_, sequence_});
+    outcomes_.erase(sequence_);
+    published_.erase(sequence_);
     words[at("sequence")] = sequence_;
     words[at("part_id")] = static_cast<std::uint16_t>(pick(20) == 0 ? 9 : 1 + pick(2));
     words[at("supply_id")] = pick(20) == 0 ? 2 : 1;
