@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "base/overloaded.hpp"
+
 namespace binpick::drivers::pivot {
 namespace {
 enum class Type { F32, U32, U16, Report };
@@ -124,13 +126,6 @@ Expected<Reply, DecodeError> decode_motion_reply(const CanFrame& frame) {
   }
   return Reply{accepted};
 }
-
-template <class... F>
-struct Overloaded : F... {
-  using F::operator()...;
-};
-template <class... F>
-Overloaded(F...) -> Overloaded<F...>;
 }  // namespace
 
 std::string to_string(const DecodeError& error) {

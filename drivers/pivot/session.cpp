@@ -15,9 +15,10 @@ namespace binpick::drivers::pivot {
 namespace {
 using namespace std::chrono_literals;
 
-constexpr int kAttemptsMax = 3;                 ///< A request is sent this often before the module counts as gone.
-constexpr Duration kProbePause = 200ms;         ///< With three attempts of 100 ms: one probe in half a second.
-constexpr Duration kQuiet = 300ms;              ///< After a reply that came too late, before the module is believed.
+constexpr int kAttemptsMax = 3;          ///< A request is sent this often before the module counts as gone.
+constexpr Duration kProbePause = 200ms;  ///< With three attempts of 100 ms: one probe in half a second.
+constexpr int kLateReadsMax = 5;         ///< Of the nine reads of an identification: a busy host may be late once.
+constexpr Duration kQuiet = 300ms;       ///< After a reply that came too late, before the module is believed.
 constexpr Duration kStatePollStanding = 250ms;  ///< Full state word, for what the short state does not say.
 constexpr Duration kStatePollMoving = 100ms;
 constexpr Duration kReferencePoll = 50ms;
@@ -27,6 +28,7 @@ constexpr Duration kWatchdogPeriod = 50ms;       ///< The module's own period is
 constexpr Duration kMoveLateMax = 1s;            ///< After the end of its ramp, a move must be done.
 constexpr Duration kStoppedReferencePause = 3s;  ///< A stopped reference run is not started again at once.
 constexpr Duration kSetpointCycleMax = 20ms;
+constexpr Duration kSettle = 100ms;              ///< The last set-point is repeated this often, in case it was lost.
 constexpr double kTargetTolerance_rad = 0.0015;  ///< 0.09 degrees; the axis repeats to 0.02.
 constexpr double kAcceleration_rad_s2 = 4.0;     ///< Gentler than most modules can: the scanner rides on the axis.
 constexpr std::size_t kEventsMax = 100'000;      ///< Nobody takes them: drop the oldest rather than grow.
@@ -95,7 +97,11 @@ struct Session::Impl {
   // The bus.
   bool bus_off = false;
   bool error_passive = false;
-  TimePoint ambiguous_until{};  ///< A repeated request may still be answered twice until then.
+  int doubles =
+      0;  ///< Positions that were asked twice and may come twice, the second one as the answer to a later request.
+  TimePoint doubles_until{};
+  int late_reads = 0;     ///< While identifying: answers that took longer than a position's may.
+  bool repeated = false;  ///< While identifying: a request had to be repeated; late answers may still come.
   int garbled = 0;
   std::string garbled_text;
   std::uint32_t foreign_module = 0;
@@ -137,6 +143,9 @@ struct Session::Impl {
       out.push_back(encode(options.module_id, Plain{Command::Halt}));
     phase = Phase::Identify;
     identity_index = 0;
+    repeated = false;
+    late_reads = 0;
+    doubles = 0;
     outstanding.reset();
     drop_move();
     halt = Halt::None;
@@ -187,6 +196,12 @@ struct Session::Impl {
     fail(power ? Failed::Why::PowerFault : otherwise, "pivot: " + faults_in_words(word));
   }
 
+  /// A reference run or a move that ended with the module's error stays what was told.
+  Failed::Why why_so_far() const {
+    const bool keep = failed == Failed::Why::ReferenceFailed || failed == Failed::Why::MoveRefused;
+    return keep ? *failed : Failed::Why::ModuleError;
+  }
+
   void lost() {
     const unsigned id = options.module_id;
     if (bus_off) {
@@ -214,8 +229,9 @@ struct Session::Impl {
 
   void late_replies(Duration round_trip) {
     fail(Failed::Why::NoReply,
-         formatted("pivot module %u answers too late (%.0f ms): positions would be wrong; check bus load and adapter",
-                   unsigned{options.module_id}, in_ms(round_trip)));
+         formatted(
+             "pivot module %u answers too late (%.0f ms or more): positions would be wrong; check bus load and adapter",
+             unsigned{options.module_id}, in_ms(round_trip)));
     identify(kQuiet);
   }
 
@@ -279,13 +295,14 @@ struct Session::Impl {
       return Get{Parameter::StateWord};
     }
     if (stream && now >= setpoint_at) {
-      if (last_setpoint_at != TimePoint{} && now - last_setpoint_at > options.setpoint_horizon) {
+      const bool settled = last_setpoint_at >= stream->end();
+      if (last_setpoint_at != TimePoint{} && !settled && now - last_setpoint_at > options.setpoint_horizon) {
         // The module has run out of set-points and stands: going on with the old ramp would be a jump.
         goal = {stream->target(), stream_speed};
         stream.reset();
         setpoint_at = now + cycle;
       } else {
-        setpoint_at = now + cycle;
+        setpoint_at = now + (now >= stream->end() ? kSettle : cycle);
         if ((shorts & short_state::kBufferFull) == 0) {
           last_setpoint_at = now;
           const Setpoint next = stream->at(now);
@@ -333,13 +350,14 @@ struct Session::Impl {
     const Outstanding was = *outstanding;
     outstanding.reset();
     const Duration round_trip = received_at - was.sent_at;
-    const bool sure = was.attempts == 1 && now >= ambiguous_until;
     bus_off = false;
     error_passive = false;
     if (std::holds_alternative<MoveAccepted>(reply)) setpoints_missed = 0;
     const auto* value = std::get_if<Value>(&reply);
     if (value == nullptr) return on_command_done(was.request);
-    if (phase == Phase::Identify && (!sure || round_trip > options.reply_timeout / 2)) return late_replies(round_trip);
+    if (phase == Phase::Identify && round_trip > round_trip_max() && ++late_reads >= kLateReadsMax)
+      return late_replies(round_trip);
+    const bool sure = is_sure(was.attempts, *value);
     if (const auto* report = std::get_if<PositionReport>(&value->value)) {
       shorts = report->short_state;
       on_position(report->position_rad, was.sent_at, round_trip, sure);
@@ -353,6 +371,28 @@ struct Session::Impl {
     } else if (phase == Phase::Identify) {
       on_identity(*value);
     }
+  }
+
+  static bool has_position(const Value& value) {
+    return value.parameter == Parameter::Position || value.parameter == Parameter::PositionAndState;
+  }
+
+  /// Whether a position is the answer to the request it seems to answer, and not a late one to an earlier request.
+  bool is_sure(int attempts, const Value& value) {
+    if (!has_position(value)) return true;
+    if (attempts > 1) return false;
+    if (doubles == 0 || now >= doubles_until) return true;
+    --doubles;
+    return false;
+  }
+
+  void on_unexpected(const Reply& reply) {
+    const auto* value = std::get_if<Value>(&reply);
+    if (value == nullptr) return;  // echoes of commands that waited for none
+    if (has_position(*value) && doubles > 0) --doubles;
+    if (phase != Phase::Identify) return;
+    if (repeated) return late_replies(options.reply_timeout);
+    identify(kQuiet);  // answers to what was asked before: let them pass
   }
 
   void on_command_done(const Request& request) {
@@ -391,6 +431,11 @@ struct Session::Impl {
         break;
     }
     if (++identity_index < kIdentity.size()) return;
+    if (std::exchange(repeated, false)) {  // once more, when late answers would have come
+      --identity_index;
+      step_at = now + kQuiet;
+      return;
+    }
     identity_index = 0;
     shorts = to_short_state(word);
     if (const std::string problem = module_problem(); !problem.empty()) {
@@ -441,7 +486,7 @@ struct Session::Impl {
       return;
     }
     if ((word & (state::kFaults | state::kHalt)) == 0) return go_on_from_state();
-    if ((word & state::kFaults) != 0) fail_by_state(Failed::Why::ModuleError);
+    if ((word & state::kFaults) != 0) fail_by_state(why_so_far());
     if (now >= reset_at) {
       reset_at = now + kResetPeriod;
       step_at = now + kResetSettle;
@@ -551,7 +596,12 @@ struct Session::Impl {
   void on_no_reply() {
     const Outstanding was = *outstanding;
     outstanding.reset();
-    ambiguous_until = now + 1s;
+    repeated = phase == Phase::Identify;
+    if (const auto* get = std::get_if<Get>(&was.request);
+        get != nullptr && (get->parameter == Parameter::Position || get->parameter == Parameter::PositionAndState)) {
+      ++doubles;
+      doubles_until = now + kQuiet;
+    }
     if (std::holds_alternative<pivot::Move>(was.request)) {
       if (++setpoints_missed >= kAttemptsMax) return lost();
       setpoint_at = now;  // a fresh one, not the same again: time has passed
@@ -613,8 +663,8 @@ struct Session::Impl {
       state_next = phase == Phase::Stand || phase == Phase::Move;
     } else if (outstanding && answers(outstanding->request, *reply)) {
       on_reply(*reply, received_at);
-    } else if (phase == Phase::Identify && !outstanding) {
-      step_at = std::max(step_at, now + kQuiet);  // late answers still on their way: believe nothing yet
+    } else {
+      on_unexpected(*reply);
     }
   }
 

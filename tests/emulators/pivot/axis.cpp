@@ -4,8 +4,9 @@
 
 namespace binpick::emulators {
 namespace {
+constexpr double kStandstill_rad = 1e-9;
 constexpr Duration kMemory = std::chrono::seconds(10);
-}
+}  // namespace
 
 Axis::Axis(double position) {
   legs_.push_back(Leg{TimePoint::min(), TimePoint::min(), position, position, std::nullopt});
@@ -34,7 +35,7 @@ double Axis::speed(TimePoint at) const {
 
 bool Axis::moving(TimePoint at) const {
   const Leg& leg = leg_at(at);
-  return at < leg.end && at >= leg.start && leg.from != leg.to;
+  return at < leg.end && at >= leg.start && std::abs(leg.to - leg.from) > kStandstill_rad;
 }
 
 bool Axis::queued(TimePoint at) const { return legs_.back().start > at; }

@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "drivers/pivot/codec.hpp"
 #include "drivers/pivot/session.hpp"
 #include "tests/emulators/pivot/pivot.hpp"
 
@@ -21,12 +22,18 @@ struct Bench {
         for (const CanFrame& frame : session.take_frames()) {
           quiet = false;
           sent.push_back(frame);
-          module.on_frame(frame, now);
+          if (lost()) continue;
+          const bool step = frame.length == 8;
+          if (step && lose_steps) {
+            session.on_frame(encode(12, Reply{MoveAccepted{Motion::Step, std::nullopt}}), now);
+          } else {
+            module.on_frame(frame, now);
+          }
         }
       }
       for (const CanFrame& frame : module.take_frames()) {
         quiet = false;
-        if (driver_alive) session.on_frame(frame, now);
+        if (driver_alive && !lost()) session.on_frame(frame, now);
       }
       if (quiet) break;
     }
@@ -38,19 +45,19 @@ struct Bench {
     }
   }
 
+  bool lost() { return lose_frame_in >= 0 && lose_frame_in-- == 0; }
+
   /// Jumps to the earliest deadline of both, never past `end`.
   bool step(TimePoint end) {
     auto at = earlier(driver_alive ? session.deadline() : std::nullopt, module.deadline());
     const TimePoint next = std::max(now, std::min(at.value_or(end), end));
-    if (next == now)
-      ++stuck;
-    else
-      stuck = 0;
+    standstill = next == now ? standstill + 1 : 0;
+    busy = busy || standstill > 50;
     now = next;
     if (driver_alive && session.deadline() && *session.deadline() <= now) session.on_deadline(now);
     if (module.deadline() && *module.deadline() <= now) module.on_deadline(now);
     pump();
-    return now < end && stuck < 1000;
+    return now < end && !busy;
   }
 
   void run_for(Duration time) {
@@ -88,7 +95,10 @@ struct Bench {
   emulators::Pivot module;
   Session session;
   bool driver_alive = true;
-  int stuck = 0;  ///< Steps without progress in time: a busy loop.
+  int lose_frame_in = -1;   ///< So many frames pass, either way, then one is lost.
+  bool lose_steps = false;  ///< Steps are acknowledged and not done.
+  int standstill = 0;       ///< Steps in a row without progress in time.
+  bool busy = false;        ///< Too many of them: a busy loop.
   std::vector<Event> events;
   std::vector<Sample> samples;
   std::vector<CanFrame> sent;
