@@ -1,5 +1,6 @@
 #include "vision/knowledge_base.hpp"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -23,21 +24,7 @@ using Impl = KnowledgeBase::Impl;
 using Kind = KnowledgeBaseError::Kind;
 constexpr std::array<char, 8> kMagic{'B', 'I', 'N', 'P', 'I', 'C', 'K', 'B'};
 constexpr std::uint32_t kVersion = 1;
-constexpr std::size_t kHeaderBytes = 32, kLengthAt = 16, kChecksumAt = 24;
-
-/// FNV-1a over words of eight bytes: each step maps different states to different states, so that no single changed
-/// word, hence no flipped byte, can go unseen.
-std::uint64_t checksum(std::span<const std::byte> bytes) {
-  std::uint64_t hash = 0xCBF29CE484222325ULL;
-  std::size_t at = 0;
-  for (; at < bytes.size(); at += 8) {
-    std::uint64_t word = 0;
-    if (at != kChecksumAt) std::memcpy(&word, bytes.data() + at, std::min<std::size_t>(8, bytes.size() - at));
-    hash = (hash ^ word) * 0x9E3779B97F4A7C15ULL;
-    hash ^= hash >> 32;
-  }
-  return hash ^ bytes.size();
-}
+constexpr std::size_t kHeaderBytes = 32;
 
 class Writer {
  public:
@@ -210,12 +197,26 @@ std::vector<std::byte> encoded(const Impl& part) {
   out.item(std::uint64_t{0});
   write(out, part);
   const std::uint64_t length = out.bytes.size();
-  std::memcpy(out.bytes.data() + kLengthAt, &length, 8);
-  const std::uint64_t sum = checksum(out.bytes);
-  std::memcpy(out.bytes.data() + kChecksumAt, &sum, 8);
+  std::memcpy(out.bytes.data() + kKnowledgeBaseLengthAt, &length, 8);
+  const std::uint64_t sum = knowledge_base_checksum(out.bytes);
+  std::memcpy(out.bytes.data() + kKnowledgeBaseChecksumAt, &sum, 8);
   return std::move(out.bytes);
 }
 }  // namespace
+
+/// FNV-1a over words of eight bytes: each step maps different states to different states, so that no single changed
+/// word, hence no flipped byte, can go unseen.
+std::uint64_t knowledge_base_checksum(std::span<const std::byte> file) {
+  std::uint64_t hash = 0xCBF29CE484222325ULL;
+  for (std::size_t at = 0; at < file.size(); at += 8) {
+    std::uint64_t word = 0;
+    if (at != kKnowledgeBaseChecksumAt)
+      std::memcpy(&word, file.data() + at, std::min<std::size_t>(8, file.size() - at));
+    hash = (hash ^ word) * 0x9E3779B97F4A7C15ULL;
+    hash ^= hash >> 32;
+  }
+  return hash ^ file.size();
+}
 
 std::size_t knowledge_base_bytes(const Impl& part) {
   std::size_t views = 0;
@@ -246,7 +247,7 @@ Expected<KnowledgeBase, KnowledgeBaseError> KnowledgeBase::parse(std::span<const
   if (bytes.size() < length)
     return failed(Kind::Truncated, "is truncated: " + std::to_string(bytes.size()) + " of " + std::to_string(length) +
                                        " bytes; copy or train it again");
-  if (bytes.size() > length || checksum(bytes) != sum)
+  if (bytes.size() > length || knowledge_base_checksum(bytes) != sum)
     return failed(Kind::Checksum, "is damaged: its checksum is wrong; copy or train it again");
   Reader in(bytes.subspan(kHeaderBytes));
   auto part = std::make_shared<Impl>();

@@ -57,4 +57,7 @@ struct KnowledgeBase::Impl {
 
 /// Length of the file that save() writes.
 std::size_t knowledge_base_bytes(const KnowledgeBase::Impl& part);
+/// Of a whole file, its own eight bytes left out: any single flipped byte changes it.
+std::uint64_t knowledge_base_checksum(std::span<const std::byte> file);
+inline constexpr std::size_t kKnowledgeBaseLengthAt = 16, kKnowledgeBaseChecksumAt = 24;
 }  // namespace binpick::vision

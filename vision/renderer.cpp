@@ -94,14 +94,13 @@ class OsmesaRenderer final : public DepthRenderer {
 
  private:
   void bind(int rows, int cols) {
-    if (rows > held_rows_ || cols > held_cols_) {
-      held_rows_ = std::max(rows, held_rows_);
-      held_cols_ = std::max(cols, held_cols_);
-      colour_.resize(static_cast<std::size_t>(held_rows_) * static_cast<std::size_t>(held_cols_) * 4);
-    } else if (OSMesaGetCurrentContext() == context_) {
-      return;
-    }
-    BINPICK_CHECK(OSMesaMakeCurrent(context_, colour_.data(), GL_UNSIGNED_BYTE, held_cols_, held_rows_) == GL_TRUE);
+    // A frame of just this image, whatever was drawn before: Mesa counts rows from the frame's top, and the rounding of
+    // heights must not depend on history.
+    if (rows == bound_rows_ && cols == bound_cols_ && OSMesaGetCurrentContext() == context_) return;
+    bound_rows_ = rows;
+    bound_cols_ = cols;
+    colour_.resize(static_cast<std::size_t>(rows) * static_cast<std::size_t>(cols) * 4);
+    BINPICK_CHECK(OSMesaMakeCurrent(context_, colour_.data(), GL_UNSIGNED_BYTE, cols, rows) == GL_TRUE);
     glEnable(GL_DEPTH_TEST);
     glDepthFunc(GL_LESS);
     glDisable(GL_CULL_FACE);  // A mesh with flipped normals looks the same.
@@ -120,7 +119,7 @@ class OsmesaRenderer final : public DepthRenderer {
   std::vector<Eigen::Vector3f> vertices_;  ///< Relative to middle_.
   std::vector<GLuint> indices_;
   std::vector<unsigned char> colour_;  ///< OSMesa wants one, nobody draws in it.
-  int held_rows_ = 0, held_cols_ = 0;
+  int bound_rows_ = 0, bound_cols_ = 0;
   std::vector<float> depth_;
 };
 }  // namespace

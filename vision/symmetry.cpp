@@ -264,7 +264,8 @@ Symmetry find_symmetry(const Mesh& mesh, double tolerance_mm) {
 
 std::string to_string(const Symmetry& symmetry) {
   char text[96];
-  const Vector3d& a = symmetry.axis;
+  // No "-0.000".
+  const Vector3d a = symmetry.axis.unaryExpr([](double x) { return std::abs(x) < 5e-4 ? 0.0 : x; });
   switch (symmetry.kind) {
     case Symmetry::Kind::None:
       return "none";

@@ -15,6 +15,7 @@
 namespace binpick::vision {
 namespace {
 constexpr double kSmallPartMm = 150;  ///< Below, a part belongs to the triangulation scanners.
+constexpr double kLargestPartMm = 5000;
 constexpr int kRotationsMax = 60'000;
 constexpr int kLooks = 4;
 constexpr std::size_t kVotesPerView = 256;
@@ -123,6 +124,9 @@ Expected<KnowledgeBase, MeshError> train(const Mesh& mesh, const PartOptions& op
   if (mesh.triangles.empty()) return failed("the mesh holds no triangle; export the part as a surface mesh");
   auto part = std::make_shared<KnowledgeBase::Impl>(resolved(mesh, options));
   if (!(part->diameter_mm > 0)) return failed("the mesh has no extent; check mesh_unit");
+  if (part->diameter_mm > kLargestPartMm)
+    return failed("the part's diameter is " + std::to_string(part->diameter_mm) + " mm, over " +
+                  std::to_string(kLargestPartMm) + " mm; check mesh_unit");
   if (!(part->pixel_mm > 0) || part->diameter_mm / part->pixel_mm > 1000)
     return failed("a pixel of " + std::to_string(part->pixel_mm) + " mm is too small for a part of " +
                   std::to_string(part->diameter_mm) + " mm; check mesh_unit and pixel_mm");
