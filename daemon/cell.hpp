@@ -51,6 +51,7 @@ class Cell {
   bool safe() const;
 
   CellState state() const { return state_; }
+  drivers::sweep::State sweep_state() const { return sweep_.state(); }
   std::uint64_t cycles() const { return cycle_id_; }
 
  private:
@@ -62,6 +63,7 @@ class Cell {
   void stop_cycle(TimePoint now);
   void put_in_force(TimePoint now);
   void update_ready(TimePoint now);
+  void watch_robot_lines(TimePoint now);
   void device_failed(plc::Alarm alarm, const std::string& text, TimePoint now);
   void alarm_off(std::optional<plc::Alarm>& standing, TimePoint now);
 
@@ -82,6 +84,8 @@ class Cell {
   CellState state_ = CellState::Idle;
   bool stopping_ = false;
   bool robot_lost_ = false;
+  std::uint64_t robot_bad_lines_ = 0;
+  std::optional<TimePoint> robot_bad_since_;
   std::optional<plc::Alarm> pivot_alarm_, scanner_alarm_;  // standing, cleared when the device is ready again
   std::uint64_t cycle_id_ = 0;
   std::uint16_t pick_id_ = 0;

@@ -72,19 +72,19 @@ class Watchdog {
     std::uint64_t us = 0;
     if (sd_watchdog_enabled(0, &us) > 0) period_ = std::chrono::microseconds(us) / 3;
   }
-  std::optional<TimePoint> deadline() const { return period_ ? std::optional{next_} : std::nullopt; }
+  std::optional<TimePoint> deadline() const { return period_.count() > 0 ? std::optional{next_} : std::nullopt; }
   void turn(const VisionWorker& worker, TimePoint now) {
     if (worker.progress() != progress_ || !worker.busy()) {
       progress_ = worker.progress();
       progress_at_ = now;
     }
-    if (!period_ || now < next_) return;
-    next_ = now + *period_;
+    if (period_.count() == 0 || now < next_) return;
+    next_ = now + period_;
     if (now - progress_at_ < kDetectionHangs) sd_notify(0, "WATCHDOG=1");
   }
 
  private:
-  std::optional<Duration> period_;
+  Duration period_{0};  // 0: no watchdog is wanted
   TimePoint next_{};
   std::uint64_t progress_ = 0;
   TimePoint progress_at_{};

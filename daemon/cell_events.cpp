@@ -1,0 +1,192 @@
+#include <algorithm>
+
+#include "base/check.hpp"
+#include "base/log.hpp"
+#include "base/overloaded.hpp"
+#include "daemon/cell.hpp"
+#include "vision/registration.hpp"
+
+/// What the sessions say, as inputs of the cycle's table.
+namespace binpick::daemon {
+namespace {
+plc::Alarm alarm_of(const drivers::pivot::Failed& failed) {
+  using Why = drivers::pivot::Failed::Why;
+  switch (failed.why) {
+    case Why::NoReply:
+      return plc::Alarm::PivotNoReply;
+    case Why::BusDown:
+      return plc::Alarm::PivotNoReply;
+    case Why::BusOff:
+      return plc::Alarm::PivotBusOff;
+    case Why::ModuleError:
+      return plc::Alarm::PivotModuleError;
+    case Why::PowerFault:
+      return plc::Alarm::PivotPowerFault;
+    case Why::ReferenceFailed:
+      return plc::Alarm::PivotReferenceFailed;
+    case Why::MoveRefused:
+      return plc::Alarm::PivotModuleError;
+  }
+  return plc::Alarm::PivotModuleError;
+}
+
+plc::Alarm alarm_of(const drivers::lms400::Failed& failed) {
+  using Why = drivers::lms400::Failed::Why;
+  switch (failed.why) {
+    case Why::NoReply:
+      return plc::Alarm::ScannerNoReply;
+    case Why::BadTelegram:
+      return plc::Alarm::ScannerBadTelegrams;
+    case Why::Refused:
+      return plc::Alarm::ScannerRefused;
+    case Why::NoProfiles:
+      return plc::Alarm::ScannerNoProfiles;
+    case Why::LinkLost:
+      return plc::Alarm::ScannerNoReply;
+  }
+  return plc::Alarm::ScannerNoReply;
+}
+}  // namespace
+
+void Cell::on(const plc::Event& event, TimePoint now) {
+  std::visit(Overloaded{
+                 [&](const plc::RequestAccepted& accepted) {
+                   const auto& config = data_->config;
+                   request_ = accepted.request;
+                   const auto recipe = std::ranges::find(config.recipes, request_.part_id, &config::Recipe::id);
+                   const auto supply = std::ranges::find(config.supplies, request_.supply_id, &config::Supply::id);
+                   BINPICK_CHECK(recipe != config.recipes.end() && supply != config.supplies.end());
+                   recipe_ = static_cast<std::size_t>(recipe - config.recipes.begin());
+                   supply_ = static_cast<std::size_t>(supply - config.supplies.begin());
+                   ++cycle_id_;
+                   request_at_ = now;
+                   robot_.withdraw(drivers::robot::NoPick::NotReady);
+                   BINPICK_LOG(Info, "cell", "cycle %llu: request %u for part %u in supply %u",
+                               static_cast<unsigned long long>(cycle_id_), request_.sequence, request_.part_id,
+                               request_.supply_id);
+                   apply(CellInput::Request, now);
+                   if (plc_.robot_clear()) {
+                     apply(CellInput::RobotClear, now);
+                   } else {
+                     BINPICK_LOG(Info, "cell", "cycle %llu waits: the robot is not clear of the view",
+                                 static_cast<unsigned long long>(cycle_id_));
+                   }
+                 },
+                 [&](const plc::CycleAborted&) {
+                   BINPICK_LOG(Notice, "cell", "cycle %llu aborted by the PLC",
+                               static_cast<unsigned long long>(cycle_id_));
+                   apply(CellInput::Cancelled, now);
+                 },
+                 [&](const plc::CycleTimedOut&) {
+                   BINPICK_LOG(Warning, "cell", "cycle %llu took too long and is given up",
+                               static_cast<unsigned long long>(cycle_id_));
+                   apply(CellInput::Cancelled, now);
+                 },
+                 [&](const plc::ResetRaised&) { BINPICK_LOG(Notice, "cell", "reset by the PLC"); },
+                 [&](const plc::ResultAcknowledged&) {},
+                 [&](const plc::RobotClearChanged& changed) {
+                   if (!changed.clear) cycle_alarm_ = plc::Alarm::RobotNotClear;
+                   apply(changed.clear ? CellInput::RobotClear : CellInput::RobotEntered, now);
+                 },
+                 [&](const plc::PlcLost&) {
+                   BINPICK_LOG(Warning, "plc", "the PLC is gone; check its program and the network");
+                   if (state_ == CellState::Idle) return;
+                   stop_cycle(now);
+                   state_ = CellState::Idle;
+                   plc_.fault(plc::Alarm::PlcLost, now);
+                 },
+                 [&](const plc::PlcBack&) { BINPICK_LOG(Notice, "plc", "the PLC is there"); },
+             },
+             event);
+}
+
+void Cell::on(const drivers::pivot::Event& event, TimePoint now) {
+  if (const auto* ready = std::get_if<drivers::pivot::Ready>(&event)) {
+    module_ = ready->module;
+    BINPICK_LOG(Notice, "pivot", "ready: module %u, firmware %04x, serial %u, %.1f … %.1f deg, %.1f deg/s at most",
+                data_->config.pivot.module_id, module_->firmware, module_->serial, module_->position_min.in_deg(),
+                module_->position_max.in_deg(), Angle::rad(module_->velocity_max_rad_s).in_deg());
+    alarm_off(pivot_alarm_, now);
+  }
+  sweep_.on_pivot(event, now);
+  if (const auto* failed = std::get_if<drivers::pivot::Failed>(&event)) {
+    if (pivot_alarm_ && *pivot_alarm_ != alarm_of(*failed)) alarm_off(pivot_alarm_, now);
+    pivot_alarm_ = alarm_of(*failed);
+    device_failed(*pivot_alarm_, "pivot: " + failed->text, now);
+  }
+}
+
+void Cell::on(const drivers::lms400::Event& event, TimePoint now) {
+  if (const auto* ready = std::get_if<drivers::lms400::Ready>(&event)) {
+    BINPICK_LOG(Notice, "scanner", "ready: %.0f Hz, %.3f deg", ready->frequency_hz, ready->resolution.in_deg());
+    alarm_off(scanner_alarm_, now);
+  }
+  sweep_.on_scanner(event, now);
+  if (const auto* failed = std::get_if<drivers::lms400::Failed>(&event)) {
+    if (scanner_alarm_ && *scanner_alarm_ != alarm_of(*failed)) alarm_off(scanner_alarm_, now);
+    scanner_alarm_ = alarm_of(*failed);
+    device_failed(*scanner_alarm_, "scanner: " + failed->text, now);
+  }
+}
+
+void Cell::on(const drivers::robot::Event& event, TimePoint now) {
+  std::visit(Overloaded{
+                 [&](const drivers::robot::Connected&) {
+                   BINPICK_LOG(Notice, "robot", "connected");
+                   if (robot_lost_) plc_.clear(plc::Alarm::RobotLost, now);
+                   robot_lost_ = false;
+                 },
+                 [&](const drivers::robot::Fetched& fetched) {
+                   BINPICK_LOG(Info, "robot", "pick %u fetched", fetched.pick_id);
+                 },
+                 [&](const drivers::robot::Reported& reported) {
+                   BINPICK_LOG(Info, "robot", "pick %u %s", reported.pick_id, reported.done ? "done" : "failed");
+                   robot_.withdraw(drivers::robot::NoPick::NotReady);
+                 },
+                 [&](const drivers::robot::Lost& lost) {
+                   BINPICK_LOG(Warning, "robot", "lost: %s; start the robot's program and check the network",
+                               lost.text.c_str());
+                   robot_lost_ = true;
+                   plc_.raise(plc::Alarm::RobotLost, now);
+                 },
+             },
+             event);
+}
+
+void Cell::on(drivers::sweep::Event& event, TimePoint now) {
+  std::visit(
+      Overloaded{
+          [&](const drivers::sweep::RegisteredProfile& registered) {
+            if (state_ != CellState::Sweeping) return;
+            const auto& config = data_->config;
+            const auto T_base_scanner = vision::scanner_at(config.mount, registered.pivot);
+            const auto T_supply_scanner = config.supplies[supply_].T_base_supply.inverse() * T_base_scanner;
+            points_supply_mm_.clear();
+            vision::register_profile(registered.profile.range_mm, registered.profile.first, registered.profile.step,
+                                     T_supply_scanner, points_supply_mm_);
+            builder_->add(points_supply_mm_);
+          },
+          [&](const drivers::sweep::Done& done) {
+            sweep_done_ = done;
+            if (done.profiles_lost > 0) {
+              BINPICK_LOG(Warning, "scanner", "%llu profiles lost in the sweep; check the network to the scanner",
+                          static_cast<unsigned long long>(done.profiles_lost));
+              plc_.raise(plc::Alarm::ScannerProfilesLost, now);
+            } else {
+              plc_.clear(plc::Alarm::ScannerProfilesLost, now);
+            }
+            apply(CellInput::SweepDone, now);
+          },
+          [&](const drivers::sweep::Failed& failed) {
+            using Device = drivers::sweep::Failed::Device;
+            cycle_alarm_ = failed.device == Device::Pivot     ? pivot_alarm_.value_or(plc::Alarm::PivotModuleError)
+                           : failed.device == Device::Scanner ? scanner_alarm_.value_or(plc::Alarm::ScannerNoReply)
+                                                              : plc::Alarm::ScanTimeout;
+            BINPICK_LOG(Warning, "cell", "cycle %llu: sweep failed: %s", static_cast<unsigned long long>(cycle_id_),
+                        failed.text.c_str());
+            apply(CellInput::SweepFailed, now);
+          },
+      },
+      event);
+}
+}  // namespace binpick::daemon
