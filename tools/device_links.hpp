@@ -1,0 +1,38 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "base/clock.hpp"
+#include "config/config.hpp"
+#include "drivers/link/can.hpp"
+#include "drivers/link/loop.hpp"
+#include "drivers/link/tcp.hpp"
+#include "drivers/pivot/session.hpp"
+#include "drivers/scanner/lms400/session.hpp"
+
+namespace binpick::tools {
+/// Pivot and scanner of a cell file on their real links, for commands that need the devices and not the daemon. The two
+/// must not run at the same time: the scanner serves one client.
+class DeviceLinks {
+ public:
+  /// `may_move`: false keeps the pivot from its reference run.
+  DeviceLinks(const config::Config& config, bool may_move);
+
+  drivers::pivot::Session& pivot() { return pivot_; }
+  drivers::lms400::Session& scanner() { return scanner_; }
+  drivers::link::Loop& loop() { return loop_; }
+
+  /// Serves deadlines, sends what there is to send, waits for the next event or `until`, whichever is first.
+  TimePoint turn(TimePoint now, TimePoint until);
+  std::string scanner_trouble() const { return scanner_link_.last_error(); }
+
+ private:
+  drivers::link::Loop loop_;
+  drivers::pivot::Session pivot_;
+  drivers::lms400::Session scanner_;
+  std::unique_ptr<drivers::link::CanLink> pivot_link_;
+  drivers::link::TcpClient scanner_link_;
+};
+}  // namespace binpick::tools

@@ -1,0 +1,144 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <optional>
+#include <string>
+
+#include "base/clock.hpp"
+#include "base/overloaded.hpp"
+#include "config/config.hpp"
+#include "tools/commands.hpp"
+#include "tools/device_links.hpp"
+
+/// binpick probe CELL.toml: reaches each configured device and says what it is, without moving anything.
+namespace binpick::tools {
+namespace {
+constexpr Duration kAnswerMax = std::chrono::seconds(4);
+constexpr Duration kSpinUpMax = std::chrono::seconds(15);  // the scanner, once it has answered at all
+constexpr Duration kRobotMax = std::chrono::seconds(3);
+
+/// Somebody listens there already; without a daemon, the address is free for us to listen on.
+bool listens(drivers::link::Loop& loop, const std::string& address) {
+  auto endpoint = drivers::link::parse_endpoint(address);
+  if (!endpoint) return false;
+  if (endpoint->host.empty() || endpoint->host == "0.0.0.0") endpoint->host = "127.0.0.1";
+  bool connected = false;
+  drivers::link::TcpClient client{loop,
+                                  *endpoint,
+                                  {.on_connected = [&](TimePoint) { connected = true; },
+                                   .on_bytes = [](ByteView, TimePoint) {},
+                                   .on_disconnected = [](TimePoint) {},
+                                   .take_output = [] { return Bytes{}; }}};
+  const SystemClock clock;
+  TimePoint now = clock.now();
+  const TimePoint until = now + std::chrono::milliseconds(300);
+  while (!connected && now < until) {
+    client.on_deadline(now);
+    now = loop.wait(earlier(client.deadline(), until));
+  }
+  return connected;
+}
+
+/// Waits a while for the robot's program to connect. Its address, or nothing.
+std::optional<std::string> robot_address(drivers::link::Loop& loop, const std::string& listen) {
+  const auto endpoint = drivers::link::parse_endpoint(listen);
+  if (!endpoint) return std::nullopt;
+  std::optional<std::string> robot;
+  drivers::link::TcpServer server{
+      loop,
+      *endpoint,
+      {.on_accept =
+           [&](drivers::link::ConnectionId, const std::string& address, std::uint16_t, TimePoint) {
+             robot = address;
+             return false;  // its program tries again, with the daemon
+           },
+       .on_bytes = [](drivers::link::ConnectionId, ByteView, TimePoint) {},
+       .on_closed = [](drivers::link::ConnectionId, TimePoint) {},
+       .take_output = [](drivers::link::ConnectionId) { return Bytes{}; },
+       .wants_close = {}}};
+  const SystemClock clock;
+  TimePoint now = clock.now();
+  const TimePoint until = now + kRobotMax;
+  while (!robot && now < until) now = loop.wait(until);
+  return robot;
+}
+
+int probe(const std::string& cell_path) {
+  const auto config = config::load(cell_path);
+  if (!config) {
+    std::fprintf(stderr, "binpick: %s has %zu findings; see them with: binpick check %s\n", cell_path.c_str(),
+                 config.error().size(), cell_path.c_str());
+    return 2;
+  }
+  DeviceLinks devices{*config, false};
+  if (listens(devices.loop(), config->plc_listen)) {
+    std::fprintf(stderr, "binpick: binpickd is at work on %s and holds the devices; stop it before probing\n",
+                 config->plc_listen.c_str());
+    return 1;
+  }
+
+  std::string pivot = "no answer", scanner;
+  bool pivot_good = false, scanner_good = false;
+  const SystemClock clock;
+  TimePoint now = clock.now();
+  const TimePoint began = now;
+  const auto patience = [&] {
+    return began + (devices.scanner().state() == drivers::lms400::Session::State::Starting ? kSpinUpMax : kAnswerMax);
+  };
+  while ((!pivot_good || !scanner_good) && now < patience()) {
+    now = devices.turn(now, std::min(patience(), now + std::chrono::milliseconds(200)));
+    while (auto event = devices.pivot().take_event()) {
+      if (const auto* ready = std::get_if<drivers::pivot::Ready>(&*event)) {
+        char text[200];
+        std::snprintf(
+            text, sizeof text,
+            "PowerCube module %u, firmware %04x, serial %u, range %.1f … %.1f deg, at most %.1f deg/s and %.0f "
+            "deg/s²",
+            config->pivot.module_id, ready->module.firmware, ready->module.serial, ready->module.position_min.in_deg(),
+            ready->module.position_max.in_deg(), Angle::rad(ready->module.velocity_max_rad_s).in_deg(),
+            Angle::rad(ready->module.acceleration_max_rad_s2).in_deg());
+        pivot = text;
+        pivot_good = true;
+      } else if (const auto* failed = std::get_if<drivers::pivot::Failed>(&*event)) {
+        if (!pivot_good) pivot = failed->text;
+      }
+    }
+    while (auto event = devices.scanner().take_event()) {
+      if (const auto* ready = std::get_if<drivers::lms400::Ready>(&*event)) {
+        char text[120];
+        std::snprintf(text, sizeof text, "SICK LMS 400, set to %.0f profiles/s at %.3f deg", ready->frequency_hz,
+                      ready->resolution.in_deg());
+        scanner = text;
+        scanner_good = true;
+      } else if (const auto* failed = std::get_if<drivers::lms400::Failed>(&*event)) {
+        scanner = failed->text;
+      }
+    }
+  }
+  if (scanner.empty()) scanner = "no connection: " + devices.scanner_trouble();
+
+  std::printf("pivot    %s: %s\n", config->pivot_can.c_str(), pivot.c_str());
+  std::printf("scanner  %s: %s\n", config->scanner_address.c_str(), scanner.c_str());
+  bool robot_good = true;
+  if (config->robot_listen.empty()) {
+    std::printf("robot    none configured: the PLC forwards the movement\n");
+  } else {
+    const auto robot = robot_address(devices.loop(), config->robot_listen);
+    robot_good = robot.has_value();
+    std::printf("robot    %s: %s\n", config->robot_listen.c_str(),
+                robot ? ("connects from " + *robot).c_str() : "no robot connects; start its program");
+  }
+  std::printf("plc      %s: free; the PLC is the client and connects when the daemon runs\n",
+              config->plc_listen.c_str());
+  return pivot_good && scanner_good && robot_good ? 0 : 1;
+}
+}  // namespace
+
+void add_probe(CLI::App& app, int& exit_status) {
+  auto cell = std::make_shared<std::string>();
+  auto* command = app.add_subcommand("probe", "Reaches each configured device and says what it is; nothing moves.");
+  command->add_option("CELL.toml", *cell, "cell file")->required();
+  command->callback([cell, &exit_status] { exit_status = probe(*cell); });
+}
+}  // namespace binpick::tools

@@ -1,0 +1,139 @@
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "base/clock.hpp"
+#include "base/overloaded.hpp"
+#include "config/config.hpp"
+#include "drivers/sweep/sweep.hpp"
+#include "tools/commands.hpp"
+#include "tools/device_links.hpp"
+#include "vision/cloud.hpp"
+#include "vision/registration.hpp"
+
+/// binpick scan CELL.toml -o SCENE.ply: one sweep, saved as a cloud that `detect` reads.
+namespace binpick::tools {
+namespace {
+constexpr Duration kReadyMax = std::chrono::seconds(45);  // a reference run and a scanner's spin-up
+constexpr Duration kSweepMax = std::chrono::seconds(60);
+
+using Cloud = std::vector<Eigen::Vector3f>;
+
+bool ready(DeviceLinks& devices) {
+  return devices.pivot().state() == drivers::pivot::Session::State::Standing &&
+         devices.scanner().state() == drivers::lms400::Session::State::Idle;
+}
+
+/// What keeps a device from being ready, as it last said itself.
+struct Troubles {
+  std::string pivot = "no answer from the module", scanner = "no connection";
+};
+
+bool bring_up(DeviceLinks& devices, drivers::sweep::Sweep& sweep, Troubles& troubles, TimePoint now, TimePoint until) {
+  while (!ready(devices)) {
+    if (now >= until) return false;
+    now = devices.turn(now, until);
+    while (auto event = devices.pivot().take_event()) {
+      sweep.on_pivot(*event, now);
+      if (const auto* failed = std::get_if<drivers::pivot::Failed>(&*event)) troubles.pivot = failed->text;
+    }
+    while (auto event = devices.scanner().take_event())
+      if (const auto* failed = std::get_if<drivers::lms400::Failed>(&*event)) troubles.scanner = failed->text;
+  }
+  return true;
+}
+
+int scan(const std::string& cell_path, const std::string& out_path, int supply_id) {
+  const auto config = config::load(cell_path);
+  if (!config) {
+    std::fprintf(stderr, "binpick: %s has %zu findings; see them with: binpick check %s\n", cell_path.c_str(),
+                 config.error().size(), cell_path.c_str());
+    return 2;
+  }
+  const config::Supply* supply = nullptr;
+  for (const auto& candidate : config->supplies)
+    if (supply_id == 0 || candidate.id == supply_id) {
+      supply = &candidate;
+      break;
+    }
+  if (supply == nullptr) {
+    std::fprintf(stderr, "binpick: %s has no supply %d; name one of its [[supply]] ids\n", cell_path.c_str(),
+                 supply_id);
+    return 2;
+  }
+
+  DeviceLinks devices{*config, true};
+  drivers::sweep::Sweep sweep{devices.pivot(), devices.scanner()};
+  const SystemClock clock;
+  TimePoint now = clock.now();
+  Troubles troubles;
+  if (!bring_up(devices, sweep, troubles, now, now + kReadyMax)) {
+    const bool pivot = devices.pivot().state() != drivers::pivot::Session::State::Standing;
+    std::fprintf(stderr, "binpick: the %s is not ready: %s; reach it with: binpick probe %s\n",
+                 pivot ? "pivot" : "scanner", (pivot ? troubles.pivot : troubles.scanner).c_str(), cell_path.c_str());
+    return 1;
+  }
+
+  now = clock.now();
+  drivers::sweep::Plan plan;
+  plan.start = supply->sweep_start;
+  plan.end = supply->sweep_end;
+  plan.speed_rad_s = supply->sweep_speed_rad_s;
+  plan.positioning_speed_rad_s = supply->sweep_speed_rad_s;
+  plan.pivot_latency = config->pivot_latency;
+  plan.scanner_latency = config->scanner_latency;
+  sweep.begin(plan, now);
+
+  Cloud cloud;
+  std::optional<drivers::sweep::Done> done;
+  std::optional<std::string> failure;
+  const TimePoint until = now + kSweepMax;
+  const auto on_sweep = Overloaded{
+      [&](const drivers::sweep::RegisteredProfile& registered) {
+        const auto T_base_scanner = vision::scanner_at(config->mount, registered.pivot);
+        vision::register_profile(registered.profile.range_mm, registered.profile.first, registered.profile.step,
+                                 supply->T_base_supply.inverse() * T_base_scanner, cloud);
+      },
+      [&](const drivers::sweep::Done& sweep_done) { done = sweep_done; },
+      [&](const drivers::sweep::Failed& failed) { failure = failed.text; },
+  };
+  while (!done && !failure) {
+    now = devices.turn(now, until);
+    while (auto event = devices.pivot().take_event()) sweep.on_pivot(*event, now);
+    while (auto event = devices.scanner().take_event()) sweep.on_scanner(*event, now);
+    if (sweep.deadline() && *sweep.deadline() <= now) sweep.on_deadline(now);
+    while (auto event = sweep.take_event()) std::visit(on_sweep, *event);
+    if (now >= until && !done) failure = "the sweep did not come to its end";
+  }
+  devices.turn(now, now);  // the last words: stop
+  if (failure) {
+    std::fprintf(stderr, "binpick: the sweep failed: %s\n", failure->c_str());
+    return 1;
+  }
+  if (const auto saved = vision::save_cloud(out_path, cloud); !saved) {
+    std::fprintf(stderr, "binpick: %s\n", saved.error().text.c_str());
+    return 1;
+  }
+  std::printf("%s: %zu points of %zu profiles over supply %u in %.2f s (%llu lost, %zu without an angle)\n",
+              out_path.c_str(), cloud.size(), done->profiles, supply->id, in_s(done->duration),
+              static_cast<unsigned long long>(done->profiles_lost), done->profiles_without_angle);
+  return 0;
+}
+}  // namespace
+
+void add_scan(CLI::App& app, int& exit_status) {
+  struct Arguments {
+    std::string cell, out;
+    int supply = 0;
+  };
+  auto arguments = std::make_shared<Arguments>();
+  auto* command = app.add_subcommand("scan", "One sweep, saved as a cloud that detect reads. The pivot moves!");
+  command->add_option("CELL.toml", arguments->cell, "cell file")->required();
+  command->add_option("-o,--output", arguments->out, "cloud to write (PLY)")->required();
+  command->add_option("--supply", arguments->supply, "id of the supply; default: the first one");
+  command->callback(
+      [arguments, &exit_status] { exit_status = scan(arguments->cell, arguments->out, arguments->supply); });
+}
+}  // namespace binpick::tools
