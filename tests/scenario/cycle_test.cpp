@@ -1,0 +1,168 @@
+#include <filesystem>
+#include <fstream>
+#include <gtest/gtest.h>
+
+#include "tests/support/cell_file.hpp"
+#include "tests/support/emulated_cell.hpp"
+#include "tests/support/scenes.hpp"
+
+namespace binpick::support {
+namespace {
+using namespace std::chrono_literals;
+
+CellFile with(const std::string& word_order) {
+  CellFile file;
+  file.word_order = word_order;
+  return file;
+}
+
+struct WholePick : testing::TestWithParam<const char*> {};
+}  // namespace
+
+TEST_P(WholePick, FromThePlcsRequestToTheRobotsReport) {
+  EmulatedCell cell{test_folder().load(with(GetParam())), scene_of("track_link", 4, 11), 11};
+  std::optional<drivers::robot::Pick> grasped;
+  cell.robot.on_grasp = [&](const drivers::robot::Pick& pick) {
+    grasped = pick;
+    return true;
+  };
+  ASSERT_TRUE(cell.run_until_ready());
+  EXPECT_EQ(cell.plc.map_problem(), "");
+  const auto result = cell.pick();
+  ASSERT_TRUE(result.has_value());
+  EXPECT_EQ(result->code, plc::ResultCode::PickFound);
+  EXPECT_GT(result->figures.profiles, 200);
+  EXPECT_GT(result->figures.points, 10'000U);
+  EXPECT_GT(result->figures.hypotheses, 0U);
+  EXPECT_GE(result->score, 0.5F);
+
+  // The robot reads the same pick under the same id, and takes it.
+  ASSERT_TRUE(cell.run_until([&] { return cell.robot.picks_done() == 1; }));
+  ASSERT_TRUE(grasped.has_value());
+  EXPECT_EQ(grasped->pick_id, result->pick_id);
+  EXPECT_EQ(grasped->sequence, result->sequence);
+  EXPECT_TRUE(grasped->T_base_grasp.iso.isApprox(result->T_base_grasp.iso, 1e-3));
+  EXPECT_TRUE(grasped->T_base_approach.iso.isApprox(result->T_base_approach.iso, 1e-3));
+
+  // And the pose is right: the detection that it came from lies on one of the objects.
+  ASSERT_FALSE(cell.results().empty());
+  const auto& seen = cell.results().back();
+  const auto& chosen = seen.report.detections[seen.choice.reachable.front().detection];
+  const auto error = error_to_nearest(cell.world, cell.cell().data().knowledge_bases.front(), chosen.T_supply_object);
+  EXPECT_LT(error.centroid_mm, 5.0);
+  EXPECT_LT(Angle::rad(error.angle_rad).in_deg(), 3.0);
+}
+INSTANTIATE_TEST_SUITE_P(BothWordOrders, WholePick, testing::Values("s7", "logix"));
+
+TEST(Cycle, AnEmptySupplyIsEmptyAForeignPartIsNothingFoundASteepOneIsNotReachable) {
+  {
+    EmulatedCell cell{test_folder().load({}), empty_scene()};
+    ASSERT_TRUE(cell.run_until_ready());
+    const auto result = cell.pick();
+    ASSERT_TRUE(result.has_value());
+    EXPECT_EQ(result->code, plc::ResultCode::SupplyEmpty);
+    EXPECT_EQ(result->pick_id, 0);
+    ASSERT_TRUE(cell.run_until_ready());
+  }
+  {
+    EmulatedCell cell{test_folder().load({}), scene_with_block()};
+    ASSERT_TRUE(cell.run_until_ready());
+    const auto result = cell.pick();
+    ASSERT_TRUE(result.has_value());
+    EXPECT_EQ(result->code, plc::ResultCode::NothingFound);
+  }
+  {
+    EmulatedCell cell{test_folder().load({}), scene_on_end("track_link")};
+    ASSERT_TRUE(cell.run_until_ready());
+    const auto result = cell.pick();
+    ASSERT_TRUE(result.has_value());
+    EXPECT_EQ(result->code, plc::ResultCode::NotReachable);
+    EXPECT_GE(result->objects_left, 1);
+  }
+}
+
+TEST(Cycle, NoSweepWhileTheRobotIsInTheView) {
+  EmulatedCell cell{test_folder().load({}), scene_of("track_link", 2, 3)};
+  ASSERT_TRUE(cell.run_until_ready());
+  cell.robot_in_the_way = true;
+  cell.run_for(200ms);
+  const Angle before = cell.pivot.angle_at(cell.now());
+  cell.plc.raise_request(1, 1);
+  cell.run_for(4s);
+  EXPECT_EQ(cell.pivot.angle_at(cell.now()), before);
+  EXPECT_TRUE(cell.plc.busy());
+  cell.robot_in_the_way = false;
+  EXPECT_TRUE(cell.run_until([&] { return cell.plc.last_result().has_value(); }));
+  EXPECT_EQ(cell.plc.last_result()->code, plc::ResultCode::PickFound);
+}
+
+TEST(Cycle, ARobotThatEntersTheViewStopsTheSweep) {
+  EmulatedCell cell{test_folder().load({}), scene_of("track_link", 2, 3)};
+  ASSERT_TRUE(cell.run_until_ready());
+  cell.plc.raise_request(1, 1);
+  ASSERT_TRUE(cell.run_until([&] { return cell.cell().sweep_state() == drivers::sweep::State::Sweeping; }));
+  cell.robot_in_the_way = true;
+  ASSERT_TRUE(cell.run_until([&] { return cell.plc.fault(); }, 1s));
+  cell.run_for(300ms);
+  EXPECT_FALSE(cell.pivot.moving(cell.now()));
+  EXPECT_TRUE(cell.plc.alarms_seen().contains(plc::Alarm::RobotNotClear));
+}
+
+TEST(Cycle, AbortInEachStateStopsThePivotAndLeavesNothingValid) {
+  using daemon::CellState;
+  for (const auto state : {CellState::AwaitingClear, CellState::Sweeping, CellState::Detecting}) {
+    EmulatedCell cell{test_folder().load({}), scene_of("track_link", 2, 3)};
+    ASSERT_TRUE(cell.run_until_ready());
+    cell.robot_in_the_way = state == CellState::AwaitingClear;
+    cell.run_for(200ms);
+    cell.plc.raise_request(1, 1);
+    ASSERT_TRUE(cell.run_until([&] { return cell.cell().state() == state; }));
+    cell.robot_in_the_way = false;
+    cell.plc.raise_abort();
+    ASSERT_TRUE(cell.run_until([&] { return cell.cell().state() == CellState::Idle; }, 1s));
+    cell.run_for(500ms);
+    EXPECT_FALSE(cell.pivot.moving(cell.now()));
+    EXPECT_FALSE(cell.plc.result_valid());
+    ASSERT_TRUE(cell.run_until_ready(3s));
+    const auto result = cell.pick();
+    ASSERT_TRUE(result.has_value());
+    EXPECT_EQ(result->code, plc::ResultCode::PickFound);
+  }
+}
+
+TEST(Cycle, AHungVisionWorkerIsATimeOutAndItsLateResultIsDropped) {
+  EmulatedCell cell{test_folder().load({}), scene_of("track_link", 2, 3)};
+  ASSERT_TRUE(cell.run_until_ready());
+  cell.worker_hangs = true;
+  cell.plc.raise_request(1, 1);
+  ASSERT_TRUE(cell.run_until([&] { return cell.plc.fault(); }, 20s));
+  EXPECT_TRUE(cell.plc.alarms_seen().contains(plc::Alarm::DetectTimeout));
+  cell.worker_hangs = false;  // the late result comes now
+  cell.run_for(1s);
+  EXPECT_FALSE(cell.plc.result_valid());
+  cell.plc.raise_reset();
+  ASSERT_TRUE(cell.run_until_ready(3s));
+  const auto result = cell.pick();
+  ASSERT_TRUE(result.has_value());
+  EXPECT_EQ(result->code, plc::ResultCode::PickFound);
+}
+
+TEST(Cycle, PickAfterPickUntilTheSupplyIsEmpty) {
+  EmulatedCell cell{test_folder().load({}), scene_of("track_link", 3, 21), 21};
+  cell.robot.on_grasp = [&](const drivers::robot::Pick& pick) {
+    return take_nearest(cell.world, cell.cell().data(), pick);
+  };
+  ASSERT_TRUE(cell.run_until_ready());
+  for (int n = 0; n < 3; ++n) {
+    const auto result = cell.pick();
+    ASSERT_TRUE(result.has_value());
+    ASSERT_EQ(result->code, plc::ResultCode::PickFound) << "pick " << n;
+    const auto done = static_cast<std::uint64_t>(n) + 1;
+    ASSERT_TRUE(cell.run_until([&] { return cell.robot.picks_done() == done && cell.robot.clear_of_view(); }));
+  }
+  const auto last = cell.pick();
+  ASSERT_TRUE(last.has_value());
+  EXPECT_EQ(last->code, plc::ResultCode::SupplyEmpty);
+  EXPECT_EQ(cell.robot.picks_failed(), 0U);
+}
+}  // namespace binpick::support

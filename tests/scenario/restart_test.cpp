@@ -1,0 +1,66 @@
+#include <gtest/gtest.h>
+
+#include "tests/support/cell_file.hpp"
+#include "tests/support/emulated_cell.hpp"
+#include "tests/support/scenes.hpp"
+
+namespace binpick::support {
+namespace {
+using namespace std::chrono_literals;
+}
+
+TEST(Restart, ThePivotStopsByItselfWhenTheDaemonVanishesInASweep) {
+  const auto data = test_folder().load({});
+  EmulatedCell cell{data, scene_of("track_link", 2, 3)};
+  ASSERT_TRUE(cell.run_until_ready());
+  const auto boot = cell.plc.boot_count();
+  cell.plc.raise_request(1, 1);
+  ASSERT_TRUE(cell.run_until([&] { return cell.cell().sweep_state() == drivers::sweep::State::Sweeping; }));
+  cell.run_for(300ms);
+  ASSERT_TRUE(cell.pivot.moving(cell.now()));
+  cell.kill_daemon();
+  cell.run_for(data->config.pivot.setpoint_horizon + 100ms);
+  EXPECT_FALSE(cell.pivot.moving(cell.now()));
+
+  cell.start_daemon();
+  ASSERT_TRUE(cell.run_until([&] { return cell.plc.boot_count() != boot && cell.plc.boot_count() != 0; }));
+  EXPECT_FALSE(cell.plc.result_valid());
+  ASSERT_TRUE(cell.run_until_ready());
+  const auto result = cell.pick();
+  ASSERT_TRUE(result.has_value());
+  EXPECT_EQ(result->code, plc::ResultCode::PickFound);
+}
+
+TEST(Restart, ARequestThatStandsAtTheStartIsNotExecuted) {
+  EmulatedCell cell{test_folder().load({}), scene_of("track_link", 2, 3)};
+  ASSERT_TRUE(cell.run_until_ready());
+  cell.plc.hold_request = true;
+  cell.plc.raise_request(1, 1);
+  ASSERT_TRUE(cell.run_until([&] { return cell.cell().sweep_state() == drivers::sweep::State::Sweeping; }));
+  cell.kill_daemon();
+  cell.run_for(1s);
+  const auto sweeps = cell.sweeps();
+  cell.start_daemon();
+  ASSERT_TRUE(cell.run_until([&] { return cell.plc.result_valid(); }, 20s));
+  EXPECT_EQ(cell.plc.word(plc::at("result_code")), static_cast<int>(plc::ResultCode::ControllerRestarted));
+  cell.run_for(3s);
+  EXPECT_EQ(cell.sweeps(), sweeps);
+}
+
+TEST(Restart, TermInEachStateIsSafeWithinTwoSeconds) {
+  using daemon::CellState;
+  for (const auto state : {CellState::Idle, CellState::AwaitingClear, CellState::Sweeping, CellState::Detecting}) {
+    EmulatedCell cell{test_folder().load({}), scene_of("track_link", 2, 3)};
+    ASSERT_TRUE(cell.run_until_ready());
+    cell.robot_in_the_way = state == CellState::AwaitingClear;
+    cell.run_for(200ms);
+    if (state != CellState::Idle) cell.plc.raise_request(1, 1);
+    ASSERT_TRUE(cell.run_until([&] { return cell.cell().state() == state; }));
+    cell.cell().shut_down(cell.now());
+    EXPECT_TRUE(cell.run_until([&] { return cell.cell().safe() && !cell.pivot.moving(cell.now()); }, 1s));
+    cell.run_for(200ms);
+    EXPECT_FALSE(cell.plc.result_valid());
+    EXPECT_FALSE(cell.plc.ready());
+  }
+}
+}  // namespace binpick::support

@@ -1,0 +1,82 @@
+#include "tests/support/cell_file.hpp"
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+#include <unistd.h>
+
+#include "tests/emulators/world/example_parts.hpp"
+#include "vision/knowledge_base.hpp"
+
+namespace binpick::support {
+namespace fs = std::filesystem;
+
+std::string to_toml(const CellFile& file) {
+  std::ostringstream out;
+  out << "[cell]\nname = \"test\"\nstate_dir = \"" << file.state_dir << "\"\npicture_dir = \"" << file.picture_dir
+      << "\"\n\n[plc]\nlisten = \"127.0.0.1:" << file.plc_port << "\"\nword_order = \"" << file.word_order
+      << "\"\nallow = []\ndetect_timeout_ms = " << file.detect_timeout_ms
+      << "\n\n[pivot]\ncan = \"cannelloni://127.0.0.1:" << file.can_port
+      << "\"\ncan_listen_port = " << file.can_listen_port
+      << "\nmodule_id = 12\nT_base_pivot = { xyz_mm = [1200, 0, 1860], rpy_deg = [0, 90, 0] }\n\n"
+      << "[scanner]\nmodel = \"lms400\"\naddress = \"127.0.0.1:" << file.scanner_port
+      << "\"\nfrequency_hz = 360\nresolution_deg = 0.25\nstart_deg = 70\nrange_deg = 40\nlatency_ms = "
+      << file.scanner_latency_ms << "\nT_pivot_scanner = { xyz_mm = [60, 0, 0], rpy_deg = [180, -90, 0] }\n\n"
+      << "[robot]\ndialect = \"ur\"\nlisten = \"127.0.0.1:" << file.robot_port << "\"\nallow = []\n\n"
+      << "[reach]\ntilt_max_deg = " << file.tilt_max_deg << "\n\n[detection]\nthreads = 2\ndeadline_ms = 3000\n\n"
+      << "[[supply]]\nid = 1\nname = \"lattice box\"\nsize_mm = [1000, 800, 500]\n"
+      << "T_base_supply = { xyz_mm = [1200, 0, 0], rpy_deg = [0, 0, 0] }\nsweep_start_deg = -15\nsweep_end_deg = 15\n"
+      << "sweep_speed_deg_s = " << file.sweep_speed_deg_s << "\n";
+  int id = 0;
+  for (const auto& part : file.parts)
+    out << "\n[[part]]\nid = " << ++id << "\nfile = \"parts/" << part << ".toml\"\nknowledge_base = \"" << part
+        << ".kb\"\nscore_min = " << file.score_min << "\n";
+  return out.str();
+}
+
+TestFolder::TestFolder() {
+  std::string pattern = (fs::temp_directory_path() / "binpick-test-XXXXXX").string();
+  if (mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("no temporary folder: " + pattern);
+  path_ = pattern;
+}
+
+TestFolder::~TestFolder() {
+  std::error_code ignored;
+  fs::remove_all(path_, ignored);
+}
+
+void TestFolder::need_part(const std::string& name) {
+  const std::string knowledge = path_ + "/" + name + ".kb";
+  if (fs::exists(knowledge)) return;
+  const std::string part_file = emulators::write_example_part(name, path_ + "/parts");
+  const auto part = config::load_part(part_file);
+  if (!part) throw std::runtime_error(to_string(part.error().front()));
+  const auto mesh = vision::load_mesh(part->mesh_path, part->mesh_unit_mm);
+  if (!mesh) throw std::runtime_error(mesh.error().text);
+  const auto trained = vision::train(*mesh, part->options, {}, nullptr);
+  if (!trained) throw std::runtime_error(trained.error().text);
+  if (const auto saved = trained->save(knowledge); !saved) throw std::runtime_error(saved.error().text);
+}
+
+std::string TestFolder::write(const CellFile& file, const std::string& name) {
+  for (const auto& part : file.parts) need_part(part);
+  const std::string file_path = path_ + "/" + name;
+  std::ofstream(file_path) << to_toml(file);
+  return file_path;
+}
+
+std::shared_ptr<const daemon::CellData> TestFolder::load(const CellFile& file) {
+  auto loaded = daemon::load_cell(write(file));
+  if (loaded) return *loaded;
+  std::string text;
+  for (const auto& finding : loaded.error()) text += finding + "\n";
+  throw std::runtime_error(text);
+}
+
+TestFolder& test_folder() {
+  static TestFolder folder;
+  return folder;
+}
+}  // namespace binpick::support

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "daemon/cell_data.hpp"
+
+namespace binpick::support {
+/// What tests vary in a cell file; the rest is one LMS 400 cell: a lattice box under a pivot.
+struct CellFile {
+  std::string word_order = "s7";
+  std::vector<std::string> parts = {"track_link"};  ///< Example parts; ids 1, 2, ….
+  double tilt_max_deg = 45;
+  double score_min = 0.5;
+  double sweep_speed_deg_s = 25;
+  double scanner_latency_ms = 0;
+  int detect_timeout_ms = 5000;
+  std::string state_dir;
+  std::string picture_dir;
+  // Sockets, for tests that use them; in memory nobody looks at them.
+  std::uint16_t plc_port = 1502, can_port = 20000, can_listen_port = 0, scanner_port = 2111, robot_port = 5002;
+};
+
+std::string to_toml(const CellFile& file);
+
+/// A folder of its own for one test program, with the example parts in it and a knowledge base for each, trained on
+/// first use. Removed at the end of the program.
+class TestFolder {
+ public:
+  TestFolder();
+  ~TestFolder();
+  TestFolder(const TestFolder&) = delete;
+  TestFolder& operator=(const TestFolder&) = delete;
+
+  const std::string& path() const { return path_; }
+  /// Writes `name` and trains what it names; returns its path.
+  std::string write(const CellFile& file, const std::string& name = "cell.toml");
+  /// write() and load: a file that tests wrote is good.
+  std::shared_ptr<const daemon::CellData> load(const CellFile& file);
+
+ private:
+  void need_part(const std::string& name);
+  std::string path_;
+};
+
+/// The program's one folder.
+TestFolder& test_folder();
+}  // namespace binpick::support

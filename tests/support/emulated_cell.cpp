@@ -1,0 +1,203 @@
+#include "tests/support/emulated_cell.hpp"
+
+#include "base/check.hpp"
+
+namespace binpick::support {
+namespace {
+emulators::PlcOptions plc_options(const config::Config& config) {
+  emulators::PlcOptions options;
+  options.word_order = config.plc.word_order;
+  options.pose_convention = config.plc.pose_convention;
+  options.base_address = config.plc.base_address;
+  return options;
+}
+
+emulators::PivotOptions pivot_options(const config::Config& config, std::uint64_t seed) {
+  emulators::PivotOptions options;
+  options.module_id = config.pivot.module_id;
+  options.seed = seed;
+  return options;
+}
+
+emulators::ScannerPlace scanner_place(const config::Config& config) {
+  return {config.mount.T_base_pivot, config.mount.T_pivot_scanner, config.supplies.front().T_base_supply};
+}
+
+emulators::RangeNoise noise(std::uint64_t seed) {
+  emulators::RangeNoise noise;
+  noise.seed = seed;
+  return noise;
+}
+}  // namespace
+
+EmulatedCell::EmulatedCell(std::shared_ptr<const daemon::CellData> data, emulators::World scene, std::uint64_t seed)
+    : world{std::move(scene)},
+      pivot{pivot_options(data->config, seed)},
+      scanner{emulators::ScannerView{world, scanner_place(data->config),
+                                     [this](TimePoint at) { return pivot.angle_at(at); }, noise(seed)}},
+      plc{plc_options(data->config)},
+      data_{std::move(data)},
+      plc_wire_{plc_wire()},
+      scanner_wire_{scanner_wire()},
+      robot_wire_{robot_wire()} {
+  start_daemon();
+}
+
+void EmulatedCell::start_daemon() {
+  cell_ = std::make_unique<daemon::Cell>(data_, ++boot_count_);
+  can_up_ = false;
+}
+
+void EmulatedCell::kill_daemon() {
+  data_ = std::make_shared<daemon::CellData>(cell_->data());
+  cell_.reset();
+  looking_.reset();
+  pump();  // the devices see their connections close
+}
+
+Wire EmulatedCell::plc_wire() {
+  return {{
+              .there = [this] { return cell_ != nullptr; },
+              .on_connected = [this](TimePoint t) { cell_->plc().on_accept(++plc_connection_, "127.0.0.1", 50000, t); },
+              .on_bytes = [this](ByteView b, TimePoint t) { cell_->plc().on_bytes(plc_connection_, b, t); },
+              .on_disconnected = [this](TimePoint t) { cell_->plc().on_closed(plc_connection_, t); },
+              .take_output = [this] { return cell_->plc().take_output(plc_connection_); },
+              .wants_close = [this] { return cell_->plc().wants_close(plc_connection_); },
+          },
+          {
+              .there = [this] { return !plc.faults.unplugged; },
+              .on_connected = [this](TimePoint t) { plc.on_connected(t); },
+              .on_bytes = [this](ByteView b, TimePoint t) { plc.on_bytes(b, t); },
+              .on_disconnected = [this](TimePoint t) { plc.on_disconnected(t); },
+              .take_output = [this] { return plc.take_output(); },
+              .wants_close = [this] { return plc.take_reopen(); },
+          }};
+}
+
+Wire EmulatedCell::scanner_wire() {
+  return {{
+              .there = [this] { return cell_ != nullptr; },
+              .on_connected = [this](TimePoint t) { cell_->scanner().on_connected(t); },
+              .on_bytes = [this](ByteView b, TimePoint t) { cell_->scanner().on_bytes(b, t); },
+              .on_disconnected = [this](TimePoint t) { cell_->scanner().on_disconnected(t); },
+              .take_output = [this] { return cell_->scanner().take_output(); },
+              .wants_close = [this] { return cell_->scanner().take_reopen(); },
+          },
+          {
+              .there = [this] { return !scanner.faults.unplugged; },
+              .on_connected = [this](TimePoint t) { scanner.on_connected(t); },
+              .on_bytes = [this](ByteView b, TimePoint t) { scanner.on_bytes(b, t); },
+              .on_disconnected = [this](TimePoint t) { scanner.on_disconnected(t); },
+              .take_output = [this] { return scanner.take_output(); },
+              .wants_close = [this] { return scanner.wants_close(); },
+          }};
+}
+
+Wire EmulatedCell::robot_wire() {
+  return {{
+              .there = [this] { return cell_ != nullptr; },
+              .on_connected = [this](TimePoint t) { cell_->robot().on_connected(t); },
+              .on_bytes = [this](ByteView b, TimePoint t) { cell_->robot().on_bytes(b, t); },
+              .on_disconnected = [this](TimePoint t) { cell_->robot().on_disconnected(t); },
+              .take_output = [this] { return cell_->robot().take_output(); },
+              .wants_close = [this] { return cell_->robot().take_reopen(); },
+          },
+          {
+              .there = [this] { return robot.wants_link(); },
+              .on_connected = [this](TimePoint t) { robot.on_connected(t); },
+              .on_bytes = [this](ByteView b, TimePoint t) { robot.on_bytes(b, t); },
+              .on_disconnected = [this](TimePoint t) { robot.on_disconnected(t); },
+              .take_output = [this] { return robot.take_output(); },
+              .wants_close = [this] { return robot.take_reopen(); },
+          }};
+}
+
+bool EmulatedCell::pump_frames() {
+  if (cell_ && !can_up_) {
+    can_up_ = true;
+    cell_->pivot().on_link_up(now_);
+  }
+  bool moved = false;
+  if (cell_)
+    for (const auto& frame : cell_->pivot().take_frames()) pivot.on_frame(frame, now_), moved = true;
+  for (const auto& frame : pivot.take_frames()) {
+    if (cell_) cell_->pivot().on_frame(frame, now_);
+    moved = true;
+  }
+  return moved;
+}
+
+void EmulatedCell::pump() {
+  for (int rounds = 0;; ++rounds) {
+    BINPICK_CHECK(rounds < 100'000);
+    plc.set_robot_clear(robot.clear_of_view() && !robot_in_the_way);
+    bool moved = pump_frames();
+    moved |= plc_wire_.pump(now_);
+    moved |= scanner_wire_.pump(now_);
+    moved |= robot_wire_.pump(now_);
+    if (cell_) {
+      cell_->run(now_);
+      if (auto request = cell_->take_detect_request()) {
+        ++sweeps_;
+        last_image_ = request->image;
+        looking_ = daemon::run_detection(*request);
+        looked_at_ = now_ + detection_time;
+        results_.push_back(*looking_);
+        moved = true;
+      }
+      if (looking_ && looked_at_ <= now_ && !worker_hangs) {
+        cell_->on_detect_result(std::move(*std::exchange(looking_, std::nullopt)), now_);
+        moved = true;
+      }
+    }
+    if (!moved) return;
+  }
+}
+
+void EmulatedCell::serve_deadlines() {
+  const auto due = [&](std::optional<TimePoint> at) { return at && *at <= now_; };
+  if (due(pivot.deadline())) pivot.on_deadline(now_);
+  if (due(scanner.deadline())) scanner.on_deadline(now_);
+  if (due(plc.deadline())) plc.on_deadline(now_);
+  if (due(robot.deadline())) robot.on_deadline(now_);
+}
+
+std::optional<TimePoint> EmulatedCell::next_deadline() const {
+  auto next = earlier(earlier(pivot.deadline(), scanner.deadline()), earlier(plc.deadline(), robot.deadline()));
+  next = earlier(next, earlier(plc_wire_.deadline(), earlier(scanner_wire_.deadline(), robot_wire_.deadline())));
+  if (cell_) next = earlier(next, cell_->deadline());
+  if (looking_ && !worker_hangs) next = earlier(next, looked_at_);
+  return next;
+}
+
+bool EmulatedCell::run_until(const std::function<bool()>& done, Duration limit) {
+  const TimePoint until = now_ + limit;
+  pump();
+  while (!done()) {
+    if (now_ >= until) return false;
+    const TimePoint next = std::min(until, next_deadline().value_or(until));
+    // A deadline that stays in the past is served in the next microsecond, so that time goes on.
+    now_ = std::max(next, now_ + std::chrono::microseconds(1));
+    serve_deadlines();
+    pump();
+  }
+  return true;
+}
+
+void EmulatedCell::run_for(Duration time) {
+  run_until([] { return false; }, time);
+}
+
+bool EmulatedCell::run_until_ready(Duration limit) {
+  return run_until([this] { return plc.ready(); }, limit);
+}
+
+std::optional<emulators::PlcResult> EmulatedCell::pick(std::uint16_t part_id, std::uint16_t supply_id) {
+  while (plc.take_result()) {
+  }
+  plc.raise_request(part_id, supply_id);
+  std::optional<emulators::PlcResult> result;
+  run_until([&] { return (result = plc.take_result()).has_value(); });
+  return result;
+}
+}  // namespace binpick::support

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "daemon/cell_data.hpp"
+#include "drivers/robot/session.hpp"
+#include "tests/emulators/world/world.hpp"
+#include "vision/knowledge_base.hpp"
+#include "vision/symmetry.hpp"
+
+/// Scenes with known truth in the tests' one supply (1000 × 800 × 500 mm).
+namespace binpick::support {
+emulators::World empty_scene();
+/// `count` objects dropped and settled.
+emulators::World scene_of(const std::string& part, int count, std::uint64_t seed);
+/// A block of 300 × 200 × 100 mm flat on the floor, its middle at the supply's origin, turned by 20 degrees about z.
+/// Nobody's part.
+emulators::World scene_with_block();
+/// One object that stands on its end: seen well, and too steep to be gripped.
+emulators::World scene_on_end(const std::string& part);
+
+/// Distance to the nearest object's true pose, symmetry-aware.
+vision::PoseDistance error_to_nearest(const emulators::World& world, const vision::KnowledgeBase& part,
+                                      const Transform<frame::Supply, frame::Object>& T_supply_object);
+/// What the gripper does at the grasp pose: takes the object that is nearest to it away. False when none is within
+/// reach.
+bool take_nearest(emulators::World& world, const daemon::CellData& data, const drivers::robot::Pick& pick);
+}  // namespace binpick::support
