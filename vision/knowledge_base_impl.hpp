@@ -29,7 +29,7 @@ struct SurfaceSample {
 /// One rotation of the part as seen from above.
 struct View {
   Eigen::Quaternionf R_supply_object;
-  /// Anchors (highest point; centroid of the top plateau; further separate maxima), best first, object frame.
+  /// Anchors (mean of the plateau close around the highest point; further separate maxima), best first, object frame.
   std::vector<Eigen::Vector3f> anchors_object_mm;
   std::vector<SurfaceSample> surface;  ///< Scattered evenly over the visible surface.
   std::vector<Eigen::Vector3f>

@@ -30,7 +30,7 @@ bool is_local_maximum(const Scene& scene, int row, int col, int radius) {
   return true;
 }
 
-/// Points of one plateau: its centroid, and means of grid cells where it is wider than one.
+/// Of one plateau: its centroid, or means of grid cells where it is wider than one.
 void add_anchors(const Scene& scene, const std::vector<Peak>& plateau, double cell_mm,
                  std::vector<Eigen::Vector3f>& anchors) {
   const auto supply = [&](const Eigen::Vector3d& p) {
@@ -56,11 +56,12 @@ void add_anchors(const Scene& scene, const std::vector<Peak>& plateau, double ce
            static_cast<int>(std::lround((p.col - centroid.x()) / cell_px))}]
         .add(p);
   const double few = 0.1 * cell_px * cell_px;
-  anchors.push_back(supply(centroid));
-  if (cells.size() > 1)
-    for (const auto& [cell, mean] : cells)
-      if (mean.n >= few && (mean.value() - centroid).head<2>().norm() > 0.4 * cell_px)
-        anchors.push_back(supply(mean.value()));
+  if (cells.size() == 1) {
+    anchors.push_back(supply(centroid));
+    return;
+  }
+  for (const auto& [cell, mean] : cells)
+    if (mean.n >= few) anchors.push_back(supply(mean.value()));
 }
 }  // namespace
 

@@ -13,7 +13,7 @@ struct MaximaOptions {
 
 /// Where a part's highest point may be, supply frame, highest first: local maxima of the depth image, each within its
 /// own piece of surface (what lies beyond a depth jump does not count: a part beside a higher one has a maximum of its
-/// own). Of a plateau the centroid, and a grid of points where it is wide: with measurement noise the highest point of
+/// own). Of a plateau the centroid, or a grid of points where it is wide: with measurement noise the highest point of
 /// a flat face lies anywhere on it.
 std::vector<Eigen::Vector3f> find_maxima(const Scene& scene, const MaximaOptions& options);
 }  // namespace binpick::vision

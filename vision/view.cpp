@@ -35,7 +35,7 @@ Eigen::Vector3d point_at(const DepthImage& image, double row, double col, double
   return {image.origin_mm.x() + col * image.pixel_mm, image.origin_mm.y() + row * image.pixel_mm, z};
 }
 
-/// Highest plateau first, then further maxima that stand clear of those before; supply axes.
+/// Highest place first, then further maxima that stand clear of those before; supply axes.
 std::vector<Eigen::Vector3d> anchors_of(const DepthImage& image, double noise_mm, double diameter_mm) {
   const auto rows = static_cast<int>(image.z_mm.rows()), cols = static_cast<int>(image.z_mm.cols());
   const int radius = std::max(2, static_cast<int>(std::lround(0.06 * diameter_mm / image.pixel_mm)));
@@ -63,9 +63,17 @@ std::vector<Eigen::Vector3d> anchors_of(const DepthImage& image, double noise_mm
     if (taken[static_cast<std::size_t>(peak.row) * static_cast<std::size_t>(cols) + static_cast<std::size_t>(peak.col)])
       continue;
     const auto plateau = plateau_of(image, peak, plateau_mm(noise_mm, diameter_mm), taken);
+    // Only the peak's own surroundings: the centroid of a wide plateau (the rim of a wheel) wanders far with the least
+    // tilt. Detection lays a grid of anchors over wide plateaus.
+    const double near_px = 0.05 * diameter_mm / image.pixel_mm;
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (const Pixel p : plateau) sum += Eigen::Vector3d(p.row, p.col, double{image.z_mm(p.row, p.col)});
-    sum /= static_cast<double>(plateau.size());
+    int n = 0;
+    for (const Pixel p : plateau) {
+      if (std::hypot(p.row - peak.row, p.col - peak.col) > near_px) continue;
+      sum += Eigen::Vector3d(p.row, p.col, double{image.z_mm(p.row, p.col)});
+      ++n;
+    }
+    sum /= n;
     const Eigen::Vector3d anchor = point_at(image, sum[0], sum[1], sum[2]);
     const auto near = [&](const Eigen::Vector3d& other) {
       return (anchor - other).head<2>().norm() < 0.15 * diameter_mm;
