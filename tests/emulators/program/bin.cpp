@@ -1,0 +1,121 @@
+#include "tests/emulators/program/bin.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <numbers>
+#include <stdexcept>
+
+#include "tests/emulators/world/example_parts.hpp"
+#include "tests/emulators/world/pile.hpp"
+#include "vision/knowledge_base.hpp"
+
+namespace binpick::emulators {
+namespace {
+/// Within this the jaws close on the object; beyond they miss it or push it away.
+constexpr double kGripMm = 15;
+constexpr double kGripRad = 10 * std::numbers::pi / 180;
+/// Symmetry is taken from the mesh when there is no knowledge base to ask.
+constexpr double kSymmetryToleranceMm = 1.5;
+
+/// A body for the physics of a part that is not ours: the hull of its mesh, by its outermost points in many directions.
+ConvexPiece hull_of(const vision::Mesh& mesh) {
+  constexpr int kDirections = 200;
+  ConvexPiece piece;
+  for (int i = 0; i < kDirections; ++i) {
+    const double z = 1 - (2.0 * i + 1) / kDirections;
+    const double angle = i * std::numbers::pi * (3 - std::sqrt(5.0));
+    const double r = std::sqrt(1 - z * z);
+    const Eigen::Vector3f direction = Eigen::Vector3d{r * std::cos(angle), r * std::sin(angle), z}.cast<float>();
+    piece.points_mm.push_back(*std::ranges::max_element(
+        mesh.vertices_mm, {}, [&](const Eigen::Vector3f& vertex) { return vertex.dot(direction); }));
+  }
+  return piece;
+}
+
+ExamplePart body_of(const config::Part& part, const vision::Mesh& mesh) {
+  const std::string stem = std::filesystem::path(part.path).stem().string();
+  if (std::ranges::find(example_part_names(), stem) != example_part_names().end()) {
+    ExamplePart example = example_part(stem);
+    if (vision::mesh_hash(example.mesh) == vision::mesh_hash(mesh)) return example;
+  }
+  ExamplePart own;
+  own.name = stem;
+  own.mesh = mesh;
+  own.pieces = {hull_of(mesh)};
+  return own;
+}
+
+vision::Mesh mesh_of(const config::Part& part) {
+  auto mesh = vision::load_mesh(part.mesh_path, part.mesh_unit_mm);
+  if (!mesh) throw std::runtime_error(mesh.error().text);
+  return std::move(*mesh);
+}
+
+vision::Symmetry symmetry_of(const config::Recipe& recipe, const vision::Mesh& mesh) {
+  if (const auto knowledge = vision::KnowledgeBase::open(recipe.knowledge_base)) return knowledge->symmetry();
+  if (recipe.part.options.symmetry) return *recipe.part.options.symmetry;
+  return vision::find_symmetry(mesh, recipe.part.options.symmetry_tolerance_mm.value_or(kSymmetryToleranceMm));
+}
+}  // namespace
+
+Bin::Bin(const config::Config& config, const BinOptions& options)
+    : supply_{config.supplies.at(options.supply)},
+      part_{config.recipes.at(options.recipe).part},
+      options_{options},
+      mesh_{mesh_of(part_)},
+      symmetry_{symmetry_of(config.recipes.at(options.recipe), mesh_)},
+      radius_mm_{mesh_.diameter_mm() / 2},
+      seed_{options.seed},
+      world_{fill(options.seed)} {}
+
+World Bin::fill(std::uint64_t seed) const {
+  return make_pile(body_of(part_, mesh_), options_.objects, supply_.size_mm, seed);
+}
+
+std::size_t Bin::objects_left() const { return world_.objects().size(); }
+
+std::optional<Bin::Nearest> Bin::nearest(const Transform<frame::Base, frame::Tcp>& T_base_grasp) const {
+  std::optional<Nearest> best;
+  double least = std::numeric_limits<double>::max();
+  for (const vision::Grasp& grasp : part_.grasps) {
+    const auto T_supply_object = supply_.T_base_supply.inverse() * T_base_grasp * grasp.T_object_tcp.inverse();
+    for (const World::Object& object : world_.objects()) {
+      const auto error = vision::pose_distance(T_supply_object.iso, object.T_supply_object.iso, symmetry_, radius_mm_);
+      const double apart = error.centroid_mm + radius_mm_ * error.angle_rad;
+      if (apart >= least) continue;
+      least = apart;
+      best = Nearest{object.id, error};
+    }
+  }
+  return best;
+}
+
+bool Bin::take(const Transform<frame::Base, frame::Tcp>& T_base_grasp) {
+  const auto found = nearest(T_base_grasp);
+  if (!found || found->error.centroid_mm > kGripMm || found->error.angle_rad > kGripRad) return false;
+  return world_.remove(found->object);
+}
+
+bool Bin::take_highest() {
+  const auto& objects = world_.objects();
+  if (objects.empty()) return false;
+  const auto highest =
+      std::ranges::max_element(objects, {}, [](const World::Object& object) { return object.box.max().z(); });
+  return world_.remove(highest->id);
+}
+
+void Bin::start_refill() {
+  if (refilling()) return;
+  ++seed_;
+  next_ = std::async(std::launch::async, [this, seed = seed_] { return fill(seed); });
+}
+
+bool Bin::poll_refill() {
+  if (!refilling() || next_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return false;
+  world_ = next_.get();
+  return true;
+}
+}  // namespace binpick::emulators

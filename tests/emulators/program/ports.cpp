@@ -1,0 +1,105 @@
+#include "tests/emulators/program/ports.hpp"
+
+#include <stdexcept>
+#include <string_view>
+
+#include "drivers/link/cannelloni_link.hpp"
+
+namespace binpick::emulators {
+namespace link = drivers::link;
+namespace {
+constexpr std::string_view kUdpScheme = "cannelloni://";
+
+link::Endpoint endpoint(const std::string& text, const char* what) {
+  const auto parsed = link::parse_endpoint(text);
+  if (!parsed) throw std::runtime_error(std::string(what) + ": " + parsed.error());
+  return *parsed;
+}
+}  // namespace
+
+PivotPort::PivotPort(const std::string& can, const PivotOptions& options) : pivot_{options} {
+  const link::CanPeer peer{
+      .on_up = [](TimePoint) {},
+      .on_frame =
+          [this](const link::CanFrame& frame, TimePoint at) {
+            const std::lock_guard lock{mutex_};
+            pivot_.on_frame(frame, at);
+          },
+      .on_down = [](const std::string&, TimePoint) {},
+      .take_frames =
+          [this] {
+            const std::lock_guard lock{mutex_};
+            return pivot_.take_frames();
+          },
+  };
+  if (can.starts_with(kUdpScheme))
+    link_ = std::make_unique<link::CannelloniLink>(loop_, endpoint(can.substr(kUdpScheme.size()), "pivot"), peer);
+  else
+    link_ = link::open_can(loop_, can, {}, peer);
+  thread_ = std::thread{[this] { run(); }};
+}
+
+PivotPort::~PivotPort() {
+  stop_ = true;
+  loop_.wake();
+  thread_.join();
+}
+
+Angle PivotPort::angle_at(TimePoint at) const {
+  const std::lock_guard lock{mutex_};
+  return pivot_.angle_at(at);
+}
+
+void PivotPort::run() {
+  TimePoint now = SystemClock{}.now();
+  while (!stop_) {
+    std::optional<TimePoint> next;
+    {
+      const std::lock_guard lock{mutex_};
+      if (pivot_.deadline() && *pivot_.deadline() <= now) pivot_.on_deadline(now);
+    }
+    if (link_->deadline() && *link_->deadline() <= now) link_->on_deadline(now);
+    link_->flush(now);
+    {
+      const std::lock_guard lock{mutex_};
+      next = earlier(pivot_.deadline(), link_->deadline());
+    }
+    now = loop_.wait(next);
+  }
+}
+
+ScannerPort::ScannerPort(link::Loop& loop, const std::string& listen, Lms400::Measure measure, std::uint64_t seed)
+    : scanner{std::move(measure), {.seed = seed}},
+      server_{loop,
+              endpoint(listen, "scanner"),
+              {
+                  .on_accept =
+                      [this](link::ConnectionId id, const std::string&, std::uint16_t, TimePoint now) {
+                        if (scanner.faults.unplugged) return false;
+                        if (connection_ != 0) scanner.on_disconnected(now);
+                        connection_ = id;
+                        scanner.on_connected(now);
+                        return true;
+                      },
+                  .on_bytes =
+                      [this](link::ConnectionId id, ByteView bytes, TimePoint now) {
+                        if (id == connection_) scanner.on_bytes(bytes, now);
+                      },
+                  .on_closed =
+                      [this](link::ConnectionId id, TimePoint now) {
+                        if (id != connection_) return;
+                        connection_ = 0;
+                        scanner.on_disconnected(now);
+                      },
+                  .take_output =
+                      [this](link::ConnectionId id) { return id == connection_ ? scanner.take_output() : Bytes{}; },
+                  .wants_close = [this](link::ConnectionId id) { return id != connection_ || scanner.wants_close(); },
+              },
+              {.connections_max = 2, .newest_wins = true, .unsent_bytes_max = 4 << 20}} {}
+
+void ScannerPort::turn(TimePoint now) {
+  if (scanner.faults.unplugged && connection_ != 0) server_.close(connection_, now);
+  if (scanner.deadline() && *scanner.deadline() <= now) scanner.on_deadline(now);
+  server_.flush(now);
+}
+}  // namespace binpick::emulators

@@ -1,0 +1,118 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "base/clock.hpp"
+#include "drivers/link/can.hpp"
+#include "drivers/link/loop.hpp"
+#include "drivers/link/tcp.hpp"
+#include "tests/emulators/pivot/pivot.hpp"
+#include "tests/emulators/plc/plc.hpp"
+#include "tests/emulators/robot/robot.hpp"
+#include "tests/emulators/scanner/lms400_device.hpp"
+
+/// The emulated devices on real sockets. The devices are the same objects that tests run in memory.
+namespace binpick::emulators {
+/// The pivot on its CAN bus. It has a thread and a loop of its own: its answers must not wait while the scanner's rays
+/// are being cast, or the daemon would see a pivot whose clock stumbles.
+class PivotPort {
+ public:
+  /// `can` is what the daemon's pivot.can says: "cannelloni://HOST:PORT" (we listen there and answer whoever speaks) or
+  /// a CAN interface. Throws std::runtime_error.
+  PivotPort(const std::string& can, const PivotOptions& options);
+  ~PivotPort();
+  PivotPort(const PivotPort&) = delete;
+  PivotPort& operator=(const PivotPort&) = delete;
+
+  Angle angle_at(TimePoint at) const;
+  /// Runs `what` on the pivot, safe against its thread.
+  template <class What>
+  auto with(What what) {
+    const std::lock_guard lock{mutex_};
+    return what(pivot_);
+  }
+  void wake() { loop_.wake(); }
+
+ private:
+  void run();
+
+  mutable std::mutex mutex_;
+  Pivot pivot_;
+  drivers::link::Loop loop_;
+  std::unique_ptr<drivers::link::CanLink> link_;
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+/// The scanner as a TCP server with one client.
+class ScannerPort {
+ public:
+  ScannerPort(drivers::link::Loop& loop, const std::string& listen, Lms400::Measure measure, std::uint64_t seed);
+  void turn(TimePoint now);
+  std::optional<TimePoint> deadline() const { return scanner.deadline(); }
+  std::uint16_t port() const { return server_.port(); }
+
+  Lms400 scanner;
+
+ private:
+  drivers::link::ConnectionId connection_ = 0;
+  drivers::link::TcpServer server_;
+};
+
+/// A device that is a TCP client of the daemon: robot or PLC. `wants_link` false: no connection is tried.
+template <class Client>
+class ClientPort {
+ public:
+  ClientPort(drivers::link::Loop& loop, drivers::link::Endpoint daemon, Client client)
+      : device{std::move(client)}, loop_{loop}, daemon_{std::move(daemon)} {}
+
+  void turn(TimePoint now) {
+    if (wants_link() != (link_ != nullptr)) {
+      if (link_) {
+        if (link_->connected()) device.on_disconnected(now);
+        link_.reset();
+      } else {
+        link_ = std::make_unique<drivers::link::TcpClient>(loop_, daemon_, peer());
+      }
+    }
+    if (device.deadline() && *device.deadline() <= now) device.on_deadline(now);
+    if (!link_) return;
+    link_->on_deadline(now);
+    link_->flush(now);
+    if (device.take_reopen()) link_->reopen(now);
+  }
+  std::optional<TimePoint> deadline() const {
+    return earlier(device.deadline(), link_ ? link_->deadline() : std::nullopt);
+  }
+  bool connected() const { return link_ && link_->connected(); }
+  std::string last_error() const { return link_ ? link_->last_error() : "unplugged"; }
+
+  Client device;
+
+ private:
+  bool wants_link() const {
+    if constexpr (requires { device.wants_link(); }) {
+      return device.wants_link();
+    } else {
+      return !device.faults.unplugged;
+    }
+  }
+  drivers::link::StreamPeer peer() {
+    return {[this](TimePoint now) { device.on_connected(now); },
+            [this](ByteView bytes, TimePoint now) { device.on_bytes(bytes, now); },
+            [this](TimePoint now) { device.on_disconnected(now); }, [this] { return device.take_output(); }};
+  }
+
+  drivers::link::Loop& loop_;
+  drivers::link::Endpoint daemon_;
+  std::unique_ptr<drivers::link::TcpClient> link_;
+};
+using RobotPort = ClientPort<Robot>;
+using PlcPort = ClientPort<Plc>;
+}  // namespace binpick::emulators

@@ -1,0 +1,88 @@
+#pragma once
+
+#include <deque>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "config/config.hpp"
+#include "drivers/link/loop.hpp"
+#include "tests/emulators/program/bin.hpp"
+#include "tests/emulators/program/command.hpp"
+#include "tests/emulators/program/ports.hpp"
+
+namespace binpick::emulators {
+struct RunOptions {
+  std::set<Device> devices;  ///< That are played here; the others are real, or played elsewhere.
+  BinOptions bin;
+  int cycles = 0;           ///< Picks until the end; 0: until told to quit.
+  double tolerance_mm = 5;  ///< A pick that is further off makes the run fail.
+  double tolerance_deg = 3;
+  Duration timeout = Duration::max();
+  Duration pick_time{std::chrono::seconds(8)};  ///< Without the emulated robot: the PLC lets a real one work this long.
+  Duration pause{0};                            ///< Between a pick and the next request.
+  bool requests = true;                         ///< The emulated PLC asks pick after pick; else by the command "pick".
+  std::string daemon_host;            ///< Where binpickd runs; empty: as the cell file says, this machine for "any".
+  std::vector<std::string> commands;  ///< Carried out at the start.
+};
+
+/// Plays the chosen devices of one cell on real sockets, all in one scene, until enough picks are made.
+class Run {
+ public:
+  /// Fills the bin and opens the sockets. Throws std::runtime_error with what and where.
+  Run(const config::Config& config, const RunOptions& options);
+  ~Run();
+  /// Exit status: 0 when all picks were within tolerance.
+  int run();
+
+ private:
+  /// One pick on its way: from the PLC's request to the robot's report, each as far as it is played here.
+  struct Pick {
+    std::optional<PlcResult> result;
+    std::optional<drivers::robot::Pick> read;
+    std::optional<Bin::Nearest> nearest;
+  };
+  enum class Step { Idle, Asked, Robot };
+
+  void open_devices();
+  void print_addresses() const;
+  void on_line(const std::string& line, TimePoint now);
+  void read_commands(TimePoint now);
+  void obey(const FaultCommand& command);
+  void obey(Order::Kind order, TimePoint now);
+  void turn_devices(TimePoint now);
+  void turn_plc(TimePoint now);
+  void on_result(const PlcResult& result, TimePoint now);
+  void turn_robot(TimePoint now);
+  void finish_pick(std::uint16_t pick_id, const std::string& how, TimePoint now);
+  void tell_alarms();
+  void refill_when_low();
+  std::optional<TimePoint> deadline() const;
+  void finish(int status, const std::string& why);
+  std::string summary() const;
+
+  const config::Config& config_;
+  RunOptions options_;
+  int signals_ = -1;  // before anything that starts a thread: all inherit the mask
+  drivers::link::Loop loop_;
+  Bin bin_;
+  std::unique_ptr<PivotPort> pivot_;
+  std::unique_ptr<ScannerPort> scanner_;
+  std::unique_ptr<RobotPort> robot_;
+  std::unique_ptr<PlcPort> plc_;
+  std::string typed_;
+  std::optional<int> status_;
+
+  Step step_ = Step::Idle;
+  TimePoint step_since_{}, next_request_{}, next_reset_{};
+  bool pick_wanted_ = false;
+  std::map<std::uint16_t, Pick> picks_;
+  std::uint16_t picking_ = 0;
+  plc::Alarm alarm_told_ = plc::Alarm::None;
+  int done_ = 0, good_ = 0, without_pick_ = 0, without_pick_in_row_ = 0, refills_ = 0;
+  double worst_mm_ = 0, worst_deg_ = 0;
+};
+}  // namespace binpick::emulators
