@@ -21,7 +21,7 @@ constexpr std::size_t kEventsMax = 4096;
 constexpr double kFrequencyTolerance_hz = 0.5;
 constexpr double kResolutionTolerance_deg = 0.005;
 
-constexpr std::uint32_t kConditionFailed = 0x4, kBusy = 0xD;
+constexpr std::uint32_t kUnknownMethod = 0x2, kUnknownVariable = 0x3, kConditionFailed = 0x4, kBusy = 0xD;
 
 enum class Step { StopOld, LogIn, Filter, Remission, ScanConfig, Check, Start, Stop };
 
@@ -179,8 +179,9 @@ struct Session::Impl {
       return;
     }
     const Step step = steps.front();
-    if (step == Step::Check) return finish_first(now);  // an answer is a sign of life, whatever it says
     const auto code = static_cast<std::uint32_t>(parse_integer(reply.arguments[0]).value_or(0));
+    // A device that does not know the variable is alive; one that cannot read it has a fault.
+    if (step == Step::Check && (code == kUnknownMethod || code == kUnknownVariable)) return finish_first(now);
     const bool passes = code == kBusy || (code == kConditionFailed && waits_for_motor(step));
     if (passes && now + kRetry < *retry_until) {
       BINPICK_LOG(Notice, "scanner", "%s: %s; asked again", words(step), refusal_text(code).c_str());
