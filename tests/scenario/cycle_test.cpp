@@ -72,7 +72,9 @@ TEST(Cycle, AnEmptySupplyIsEmptyAForeignPartIsNothingFoundASteepOneIsNotReachabl
     EXPECT_EQ(result->code, plc::ResultCode::NothingFound);
   }
   {
-    EmulatedCell cell{test_folder().load({}), scene_on_end("track_link")};
+    CellFile file;
+    file.tilt_max_deg = 1;  // nothing in a pile lies so straight
+    EmulatedCell cell{test_folder().load(file), scene_of("track_link", 2, 3)};
     ASSERT_TRUE(cell.run_until_ready());
     const auto result = cell.pick();
     ASSERT_TRUE(result.has_value());

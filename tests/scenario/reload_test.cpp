@@ -47,7 +47,7 @@ TEST(Reload, ABadEditLeavesAnAlarmAndTheOldConfigurationInForce) {
   // A good one takes the alarm back.
   ASSERT_TRUE(cell.run_until_ready());
   cell.cell().reload(test_folder().load({}), cell.now());
-  EXPECT_TRUE(cell.run_until([&] { return cell.plc.alarms().empty(); }, 2s));
+  EXPECT_TRUE(cell.run_until([&] { return !cell.plc.alarm_active(); }, 2s));
 }
 
 TEST(Reload, WhatNeedsARestartIsSaidByName) {

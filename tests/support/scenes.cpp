@@ -29,19 +29,6 @@ emulators::World scene_with_block() {
   return world;
 }
 
-emulators::World scene_on_end(const std::string& part) {
-  emulators::World world{kSupplySize_mm};
-  const auto example = emulators::example_part(part);
-  Transform<frame::Supply, frame::Object> T_supply_object;
-  T_supply_object.iso.rotate(Eigen::AngleAxisd{-std::numbers::pi / 2, Eigen::Vector3d::UnitY()});
-  double lowest_mm = std::numeric_limits<double>::max();
-  for (const auto& v : example.mesh.vertices_mm)
-    lowest_mm = std::min(lowest_mm, (T_supply_object * v.cast<double>()).z());
-  T_supply_object.iso.pretranslate(Eigen::Vector3d{40, -60, -lowest_mm});
-  world.add(part, std::make_shared<const emulators::RayMesh>(example.mesh), T_supply_object);
-  return world;
-}
-
 vision::PoseDistance error_to_nearest(const emulators::World& world, const vision::KnowledgeBase& part,
                                       const Transform<frame::Supply, frame::Object>& T_supply_object) {
   const double radius_mm = part.diameter_mm() / 2;

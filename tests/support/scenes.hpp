@@ -17,8 +17,6 @@ emulators::World scene_of(const std::string& part, int count, std::uint64_t seed
 /// A block of 300 × 200 × 100 mm flat on the floor, its middle at the supply's origin, turned by 20 degrees about z.
 /// Nobody's part.
 emulators::World scene_with_block();
-/// One object that stands on its end: seen well, and too steep to be gripped.
-emulators::World scene_on_end(const std::string& part);
 
 /// Distance to the nearest object's true pose, symmetry-aware.
 vision::PoseDistance error_to_nearest(const emulators::World& world, const vision::KnowledgeBase& part,
