@@ -61,7 +61,7 @@ std::vector<Eigen::Vector3f> extreme_points(const std::vector<Eigen::Vector3f>& 
     chosen.push_back(best);
   }
   std::ranges::sort(chosen);
-  chosen.erase(std::ranges::unique(chosen).begin(), chosen.end());
+  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
   std::vector<Eigen::Vector3f> extremes;
   for (const std::size_t k : chosen) extremes.push_back(points[k]);
   return extremes;
@@ -126,7 +126,8 @@ Mesh cleaned(const Mesh& mesh) {
     if (!(twice_area(mesh, t) > 0)) continue;
     Triangle now{index_of(t[0]), index_of(t[1]), index_of(t[2])};
     if (now[0] == now[1] || now[1] == now[2] || now[0] == now[2]) continue;
-    std::ranges::rotate(now, std::ranges::min_element(now));  // The same triangle has one spelling.
+    std::rotate(now.begin(), std::min_element(now.begin(), now.end()),
+                now.end());  // The same triangle has one spelling.
     if (seen.try_emplace(now, true).second) merged.triangles.push_back(now);
   }
   return merged;

@@ -174,12 +174,13 @@ std::vector<std::pair<Vector3d, int>> axes_everywhere(const SelfMatch& match) {
       ranked.emplace_back(match.coarse_rms_mm(turn(2 * kPi / order, directions[i])), i);
     std::ranges::sort(ranked);
     std::vector<Vector3d> tried;
-    for (const auto& [rms, i] : ranked) {
+    for (const auto& candidate : ranked) {
       if (tried.size() == kTried) break;
-      const auto near = [&](const Vector3d& other) { return std::abs(other.dot(directions[i])) > std::cos(0.2); };
+      const Vector3d& direction = directions[candidate.second];
+      const auto near = [&](const Vector3d& other) { return std::abs(other.dot(direction)) > std::cos(0.2); };
       if (std::ranges::any_of(tried, near)) continue;
-      tried.push_back(directions[i]);
-      const Vector3d axis = refined_axis(match, directions[i], 2 * kPi / order, 0.04);
+      tried.push_back(direction);
+      const Vector3d axis = refined_axis(match, direction, 2 * kPi / order, 0.04);
       if (match.accepts(turn(2 * kPi / order, axis))) axes.emplace_back(axis, order);
     }
   }
