@@ -25,8 +25,9 @@ constexpr std::size_t kDistinctBest = 240;
 constexpr std::size_t kTurnedBest = 16;
 constexpr std::size_t kRejectionsMax = 20;
 constexpr double kSparseToleranceDiameters = 0.035;
-/// A grid rotation is several degrees off, which moves the lowest point by so much.
-constexpr double kFloorGateDiameters = 0.05;
+/// A grid rotation is several degrees off, which moves the lowest point against the highest by so much: a narrower gate
+/// silently loses what lies flat on the floor.
+constexpr double kFloorGateDiameters = 0.12;
 constexpr double kWallGateDiameters = 0.04;
 constexpr double kSameDiameters = 0.12;
 /// Below this a hypothesis is no detection.
@@ -81,8 +82,8 @@ class Detecting {
     stage_start_ = SteadyClock::now();
     scene_ = prepare_scene(image_, noise_mm_);
     floor_mm_ = floor_of(scene_, supply_);
-    const double gate = std::max(3 * noise_mm_, kFloorGateDiameters * part_.diameter_mm);
-    lowest_allowed_mm_ = static_cast<float>(floor_mm_ - gate);
+    lowest_allowed_mm_ =
+        static_cast<float>(floor_mm_ - std::max(3 * noise_mm_, kFloorGateDiameters * part_.diameter_mm));
     ended("surface");
     const std::vector<Eigen::Vector3f> maxima = anchors();
     report_.maxima = maxima.size();
@@ -118,8 +119,8 @@ class Detecting {
     // The flattest view's top is the lowest place of any anchor.
     float rise = std::numeric_limits<float>::max();
     for (const View& view : part_.views) rise = std::min(rise, -view.lowest_mm);
-    maxima.z_min_mm =
-        part_.views.empty() ? lowest_allowed_mm_ : std::max(lowest_allowed_mm_ + rise, lowest_allowed_mm_);
+    const auto gate = static_cast<float>(std::max(2 * noise_mm_, 0.03 * part_.diameter_mm));
+    maxima.z_min_mm = part_.views.empty() ? floor_mm_ : floor_mm_ + std::max(0.5F * rise, rise - gate);
     return find_maxima(scene_, maxima);
   }
 
