@@ -42,6 +42,8 @@ INSTANTIATE_TEST_SUITE_P(
         Slip{"a = \"C:\\qa\"\n",
              "1:9: string: unknown escape sequence '\\q'; write \\\\ for one backslash, or put the text in "
              "'single quotes'\n"},
+        Slip{"a = { b = [0, 0,} }\n",
+             "1:17: this is no TOML value; put a text in \"quotes\", write a number as 1.5, a flag as true or false\n"},
         Slip{"a = True\n", "1:5: boolean: expected 'true', saw 'T'; write true or false\n"},
         Slip{"a =\n", "1:4: key-value pair: expected value, saw '\\n'; write a value after the =\n"}));
 

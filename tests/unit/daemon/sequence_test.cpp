@@ -49,7 +49,7 @@ TEST(CellSequence, OnlyADoneDetectionPublishes) {
 
 TEST(CellSequence, NoSweepWithoutAClearRobot) {
   for (const auto& row : daemon::kCellRows)
-    if (row.effect == daemon::CellEffect::BeginSweep) EXPECT_EQ(row.on, daemon::CellInput::RobotClear);
+    EXPECT_TRUE(row.effect != daemon::CellEffect::BeginSweep || row.on == daemon::CellInput::RobotClear);
 }
 
 TEST(SweepSequence, EveryRunningStateHasDeadlineAbortAndDeviceFailure) {
