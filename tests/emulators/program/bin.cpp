@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <limits>
 #include <numbers>
+#include <set>
 #include <stdexcept>
 
 #include "tests/emulators/world/example_parts.hpp"
@@ -76,6 +77,27 @@ World Bin::fill(std::uint64_t seed) const {
 }
 
 std::size_t Bin::objects_left() const { return world_.objects().size(); }
+
+std::size_t Bin::overlapping() const {
+  constexpr double kGridMm = 10;
+  constexpr double kAboveMm = 100;  // over the highest wall or object
+  const Eigen::Vector3d size = supply_.size_mm;
+  double top = size.z();
+  for (const World::Object& object : world_.objects()) top = std::max(top, double{object.box.max().z()});
+  std::set<int> found;
+  for (double x = -size.x() / 2; x < size.x() / 2; x += kGridMm)
+    for (double y = -size.y() / 2; y < size.y() / 2; y += kGridMm) {
+      std::set<int> in_line;
+      Eigen::Vector3d from{x, y, top + kAboveMm};
+      while (const auto hit = world_.cast(from, -Eigen::Vector3d::UnitZ(), from.z() + 1)) {
+        if (hit->object == 0) break;
+        in_line.insert(hit->object);
+        from.z() -= hit->distance_mm + 0.1;
+      }
+      if (in_line.size() > 1) found.insert(in_line.begin(), in_line.end());
+    }
+  return found.size();
+}
 
 std::optional<Bin::Nearest> Bin::nearest(const Transform<frame::Base, frame::Tcp>& T_base_grasp) const {
   std::optional<Nearest> best;

@@ -25,6 +25,8 @@ class Bin {
 
   const World& world() const { return world_; }
   std::size_t objects_left() const;
+  /// Objects that lie over or under another one, seen from above.
+  std::size_t overlapping() const;
   std::uint64_t seed() const { return seed_; }
 
   /// How far the object that a grasp pose stands for lies from the nearest true one, symmetry-aware. The pose belongs

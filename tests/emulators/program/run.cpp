@@ -98,6 +98,12 @@ void Run::open_devices() {
   }
 }
 
+void Run::say_bin(const char* what) const {
+  say("bin: %s%zu of %s, %zu of them over or under another, seed %llu", what, bin_.objects_left(),
+      config_.recipes.at(options_.bin.recipe).part.options.name.c_str(), bin_.overlapping(),
+      static_cast<unsigned long long>(bin_.seed()));
+}
+
 void Run::print_addresses() const {
   if (pivot_) say("pivot:   %s, module %u", config_.pivot_can.c_str(), config_.pivot.module_id);
   if (scanner_) say("scanner: listens at %s", config_.scanner_address.c_str());
@@ -106,8 +112,7 @@ void Run::print_addresses() const {
 }
 
 int Run::run() {
-  say("bin: %zu of %s, seed %llu", bin_.objects_left(),
-      config_.recipes.at(options_.bin.recipe).part.options.name.c_str(), static_cast<unsigned long long>(bin_.seed()));
+  say_bin("");
   print_addresses();
   const SystemClock clock;
   TimePoint now = clock.now();
@@ -125,8 +130,7 @@ int Run::run() {
     turn_devices(now);
     if (bin_.poll_refill()) {
       ++refills_;
-      say("bin: filled anew, %zu objects, seed %llu", bin_.objects_left(),
-          static_cast<unsigned long long>(bin_.seed()));
+      say_bin("filled anew, ");
     }
     if (plc_) turn_plc(now);
     if (robot_) turn_robot(now);

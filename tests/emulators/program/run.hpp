@@ -48,6 +48,7 @@ class Run {
   enum class Step { Idle, Asked, Robot };
 
   void open_devices();
+  void say_bin(const char* what) const;
   void print_addresses() const;
   void on_line(const std::string& line, TimePoint now);
   void read_commands(TimePoint now);
