@@ -3,14 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <deque>
-#include <span>
 
 #include "base/check.hpp"
 #include "base/log.hpp"
-#include "base/rotation.hpp"
 #include "plc/alarm_list.hpp"
 #include "plc/modbus_server.hpp"
-#include "plc/registers.hpp"
+#include "plc/register_image.hpp"
 
 namespace binpick::plc {
 namespace {
@@ -24,26 +22,6 @@ modbus::Limits limits_of(const Options& options) {
 }
 
 Timeouts timeouts_of(const Options& options) { return {options.scan_timeout, options.detect_timeout}; }
-
-/// x y z and three angles as the PLC's robot writes them (docs/plc-registers.md, pose conventions).
-std::array<double, 6> pose_numbers(const Eigen::Isometry3d& T, PoseConvention convention) {
-  const Eigen::Matrix3d R = T.linear();
-  Eigen::Vector3d p = T.translation();
-  Eigen::Vector3d angles = Eigen::Vector3d::Zero();
-  switch (convention) {
-    case PoseConvention::UniversalRobots:
-      p *= 1e-3;
-      angles = to_rotation_vector(R);
-      break;
-    case PoseConvention::Fanuc:
-      angles = to_wpr_deg(R);
-      break;
-    case PoseConvention::Kawasaki:
-      angles = to_oat_deg(R);
-      break;
-  }
-  return {p.x(), p.y(), p.z(), angles.x(), angles.y(), angles.z()};
-}
 
 /// An answer as the result block shows it.
 struct Answer {
@@ -69,23 +47,15 @@ struct Session::Impl {
                {[this](modbus::WrittenRange range, TimePoint now) { on_written(range, now); },
                 [this](TimePoint now) { on_writer_gone(now); },
                 [this](const std::string&, TimePoint now) { on_second_writer(true, now); },
-                [this](TimePoint now) { on_second_writer(false, now); }}} {
-    BINPICK_CHECK(std::size_t{opts.base_address} + kMapLength <= 65536);
+                [this](TimePoint now) { on_second_writer(false, now); }}},
+        image{server.words().subspan(opts.base_address), opts.word_order} {
+    BINPICK_CHECK(std::size_t{opts.base_address} + kMapLength <= 65536);  // the cell file's key table sees to it
     refresh();
   }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
-  // The words of the map.
-  std::span<std::uint16_t> words() { return server.words().subspan(options.base_address); }
-  std::uint16_t word(std::uint16_t offset) const { return server.words()[options.base_address + offset]; }
-  void put(std::uint16_t offset, std::uint16_t value) { words()[offset] = value; }
-  template <class T>
-  void put_long(std::uint16_t offset, T value) {
-    const auto pair = to_words(value, options.word_order);
-    put(offset, pair[0]);
-    put(static_cast<std::uint16_t>(offset + 1), pair[1]);
-  }
+  std::uint16_t word(std::uint16_t offset) const { return image.word(offset); }
 
   // What the PLC wrote.
   void on_written(modbus::WrittenRange range, TimePoint now);
@@ -103,6 +73,7 @@ struct Session::Impl {
   void show(const Answer& answer);
   void clear_result();
   void end_cycle(ResultCode code);
+  void log_refusal();
 
   // The watch on the PLC.
   void begin(TimePoint now);
@@ -116,6 +87,7 @@ struct Session::Impl {
   std::uint16_t boot_count;
   Handshake handshake;
   modbus::Server server;
+  RegisterImage image;
   AlarmList alarms;
   std::deque<Event> events;
 
@@ -125,13 +97,14 @@ struct Session::Impl {
   bool standing_answered = false;
   bool ack = false, abort_ack = false, reset_ack = false, scan_done = false;
   std::uint16_t ack_sequence = 0;
-  PickRequest asked;                            // the request being answered
-  ResultCode refusal = ResultCode::None;        // why Refuse
-  PickRequest accepted;                         // the last one accepted; sequence 0: none
-  std::optional<Answer> stored;                 // its answer, once there is one
-  std::optional<PickResult> published;          // on its way into PublishResult
-  Alarm fault_alarm = Alarm::None;              // on its way into RaiseFault
-  std::optional<std::uint16_t> shown_sequence;  // the result block is valid for it
+  PickRequest asked;                              // the request being answered
+  std::array<std::uint16_t, 3> logged_refusal{};  // code, part, supply
+  ResultCode refusal = ResultCode::None;          // why Refuse
+  PickRequest accepted;                           // the last one accepted; sequence 0: none
+  std::optional<Answer> stored;                   // its answer, once there is one
+  std::optional<PickResult> published;            // on its way into PublishResult
+  Alarm fault_alarm = Alarm::None;                // on its way into RaiseFault
+  std::optional<std::uint16_t> shown_sequence;    // the result block is valid for it
 
   std::uint16_t device_reasons = 0;
   bool starting = true;
@@ -175,9 +148,8 @@ void Session::Impl::lose_plc() {
 
 void Session::Impl::on_written(modbus::WrittenRange range, TimePoint now) {
   const auto first = static_cast<std::uint16_t>(range.first - options.base_address);
-  const auto block = words().subspan(kRequestFirst, kRequestLength);
   const auto before = seen;
-  std::ranges::copy(block, seen.begin());
+  std::ranges::copy(image.request(), seen.begin());
 
   if (seen[at("plc_heartbeat")] != before[at("plc_heartbeat")] || options.heartbeat_timeout.count() == 0) on_beat(now);
 
@@ -211,7 +183,7 @@ void Session::Impl::on_written(modbus::WrittenRange range, TimePoint now) {
 void Session::Impl::on_writer_gone(TimePoint now) {
   // Levels fall with the line that held them. The same request raised again after it is a retry, and harmless; one that
   // stood when we came up still has to be seen 0.
-  put(at("control"), word(at("control")) & control::kRobotClear);
+  image.put(at("control"), word(at("control")) & control::kRobotClear);
   seen[at("control")] = word(at("control"));
   abort_ack = reset_ack = false;
   if (seen_low) armed = true;
@@ -264,35 +236,12 @@ Signal Session::Impl::classify(const PickRequest& request) {
 }
 
 void Session::Impl::clear_result() {
-  std::ranges::fill(words().subspan(kResultFirst, kResultLength), std::uint16_t{0});
+  image.clear_result();
   shown_sequence.reset();
 }
 
 void Session::Impl::show(const Answer& answer) {
-  clear_result();
-  const PickResult& r = answer.result;
-  put(at("result_code"), static_cast<std::uint16_t>(r.code));
-  put(at("pick_id"), r.pick_id);
-  put(at("result_part_id"), r.part_id);
-  put(at("result_supply_id"), answer.request.supply_id);
-  put(at("objects_left"), r.objects_left);
-  put(at("fill_level"), r.fill_level_percent);
-  put_long(at("score"), static_cast<float>(r.score));
-  if (r.code == ResultCode::PickFound) {
-    const auto approach = pose_numbers(r.T_base_approach.iso, options.pose_convention);
-    const auto grasp = pose_numbers(r.T_base_grasp.iso, options.pose_convention);
-    for (std::uint16_t i = 0; i < 6; ++i) {
-      put_long(static_cast<std::uint16_t>(at("approach_x") + 2 * i), static_cast<float>(approach[i]));
-      put_long(static_cast<std::uint16_t>(at("grasp_x") + 2 * i), static_cast<float>(grasp[i]));
-    }
-  }
-  put(at("sweep_ms"), r.figures.sweep_ms);
-  put(at("profiles"), r.figures.profiles);
-  put_long(at("points"), r.figures.points);
-  put_long(at("hypotheses"), r.figures.hypotheses);
-  put(at("detection_ms"), r.figures.detection_ms);
-  put(at("result_sequence"), answer.request.sequence);
-  put(at("result_sequence_tail"), answer.request.sequence);
+  image.put_result(answer.request, answer.result, options.pose_convention);
   shown_sequence = answer.request.sequence;
 }
 
@@ -300,6 +249,15 @@ void Session::Impl::end_cycle(ResultCode code) {
   stored = Answer{accepted, only_code(code, accepted.part_id)};
   clear_result();
   scan_done = false;
+}
+
+void Session::Impl::log_refusal() {
+  // A PLC that asks in every poll is told in the log once, not twenty times a second.
+  const std::array<std::uint16_t, 3> refused{static_cast<std::uint16_t>(refusal), asked.part_id, asked.supply_id};
+  if (refused == logged_refusal) return;
+  logged_refusal = refused;
+  BINPICK_LOG(Info, "plc", "request %u (part %u, supply %u) refused: %s", asked.sequence, asked.part_id,
+              asked.supply_id, to_string(refusal).data());
 }
 
 void Session::Impl::apply(Signal signal, TimePoint now) {
@@ -316,6 +274,7 @@ void Session::Impl::apply(Signal signal, TimePoint now) {
       clear_result();
       acknowledge(asked.sequence);
       accepted = asked;
+      logged_refusal = {};
       stored.reset();
       scan_done = false;
       ++cycles_total;
@@ -327,8 +286,7 @@ void Session::Impl::apply(Signal signal, TimePoint now) {
     case Effect::Refuse:
       acknowledge(asked.sequence);
       show({asked, only_code(refusal, asked.part_id)});
-      BINPICK_LOG(Info, "plc", "request %u (part %u, supply %u) refused: %s", asked.sequence, asked.part_id,
-                  asked.supply_id, to_string(refusal).data());
+      log_refusal();
       break;
     case Effect::RepeatResult:
       acknowledge(asked.sequence);
@@ -403,27 +361,27 @@ void Session::Impl::refresh() {
   if (state == State::ResultValid) reasons |= static_cast<unsigned>(NotReady::ResultPending);
   if (starting) reasons |= static_cast<unsigned>(NotReady::Starting);
 
-  put(at("map_version"), kMapVersion);
-  put(at("map_length"), kMapLength);
-  put_long(at("test_f32"), kTestF32);
-  put_long(at("test_u32"), kTestU32);
-  put(at("boot_count"), boot_count);
-  put(at("cell_heartbeat"), heartbeat);
-  put(at("cell_state"), static_cast<std::uint16_t>(state));
-  put(at("status"), bits);
-  put(at("ack_sequence"), ack_sequence);
-  put(at("not_ready"), static_cast<std::uint16_t>(reasons));
-  put(at("first_alarm"), static_cast<std::uint16_t>(alarms.first()));
-  put(at("alarm_count"), alarms.count());
+  image.put(at("map_version"), kMapVersion);
+  image.put(at("map_length"), kMapLength);
+  image.put_long(at("test_f32"), kTestF32);
+  image.put_long(at("test_u32"), kTestU32);
+  image.put(at("boot_count"), boot_count);
+  image.put(at("cell_heartbeat"), heartbeat);
+  image.put(at("cell_state"), static_cast<std::uint16_t>(state));
+  image.put(at("status"), bits);
+  image.put(at("ack_sequence"), ack_sequence);
+  image.put(at("not_ready"), static_cast<std::uint16_t>(reasons));
+  image.put(at("first_alarm"), static_cast<std::uint16_t>(alarms.first()));
+  image.put(at("alarm_count"), alarms.count());
   const auto listed = alarms.listed();
   for (std::uint16_t i = 0; i < listed.size(); ++i)
-    put(static_cast<std::uint16_t>(at("alarm_1") + i), static_cast<std::uint16_t>(listed[i]));
-  put(at("last_alarm"), static_cast<std::uint16_t>(alarms.last()));
-  put(at("alarms_total"), alarms.total());
-  put(at("picks_total"), picks_total);
-  put(at("cycles_total"), cycles_total);
-  put(at("word_order"), options.word_order == WordOrder::HighWordFirst ? 0 : 1);
-  put(at("pose_convention"), static_cast<std::uint16_t>(options.pose_convention));
+    image.put(static_cast<std::uint16_t>(at("alarm_1") + i), static_cast<std::uint16_t>(listed[i]));
+  image.put(at("last_alarm"), static_cast<std::uint16_t>(alarms.last()));
+  image.put(at("alarms_total"), alarms.total());
+  image.put(at("picks_total"), picks_total);
+  image.put(at("cycles_total"), cycles_total);
+  image.put(at("word_order"), options.word_order == WordOrder::HighWordFirst ? 0 : 1);
+  image.put(at("pose_convention"), static_cast<std::uint16_t>(options.pose_convention));
 }
 
 Session::Session(const Options& options, std::uint16_t boot_count)

@@ -38,13 +38,13 @@ class Pair {
     }
     now = end;
   }
-  bool run_until(const std::function<bool()>& condition, Duration at_most = 60s) {
+  bool run_until(const std::function<bool()>& condition, Duration at_most = std::chrono::seconds(60)) {
     const TimePoint end = now + at_most;
-    while (!condition() && now < end) run_for(10ms);
+    while (!condition() && now < end) run_for(std::chrono::milliseconds(10));
     return condition();
   }
 
-  TimePoint now{1000s};
+  TimePoint now{std::chrono::seconds(1000)};
   emulators::Plc plc;
 
  private:
@@ -64,7 +64,7 @@ class Pair {
     connected_ = false;
     session->on_closed(id_, now);
     plc.on_disconnected(now);
-    reconnect_at_ = now + 200ms;
+    reconnect_at_ = now + std::chrono::milliseconds(200);
   }
 
   void step() {
@@ -73,14 +73,14 @@ class Pair {
       if (connected_)
         plc.on_connected(now);
       else
-        reconnect_at_ = now + 200ms;
+        reconnect_at_ = now + std::chrono::milliseconds(200);
     }
     if (const auto at = plc.deadline(); at && *at <= now) plc.on_deadline(now);
     if (const auto at = session->deadline(); at && *at <= now) session->on_deadline(now);
     if (scan_done_at && *scan_done_at <= now) {
       scan_done_at.reset();
       session->on_scan_done(now);
-      result_at = now + 200ms;
+      result_at = now + std::chrono::milliseconds(200);
     }
     if (result_at && *result_at <= now) {
       result_at.reset();
@@ -106,7 +106,7 @@ class Pair {
   void on(const Event& event) {
     if (const auto* request = std::get_if<RequestAccepted>(&event)) {
       accepted.push_back(request->request.sequence);
-      scan_done_at = now + 1s;
+      scan_done_at = now + std::chrono::seconds(1);
       next_result.part_id = request->request.part_id;
     }
     if (std::holds_alternative<CycleAborted>(event) || std::holds_alternative<CycleTimedOut>(event)) {

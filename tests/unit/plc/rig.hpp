@@ -12,7 +12,6 @@
 /// A Modbus master in a few lines beside one plc::Session. Its frames are written out by hand: it shares no encoder
 /// with the emulated PLC, the guard or libmodbus.
 namespace binpick::plc::test {
-using namespace std::chrono_literals;
 
 inline Bytes hex(std::initializer_list<int> values) {
   Bytes out;
@@ -69,7 +68,7 @@ class Rig {
   void run_for(Duration duration, bool beating = true) {
     const TimePoint end = now + duration;
     while (now < end) {
-      now = std::min(end, now + 100ms);
+      now = std::min(end, now + std::chrono::milliseconds(100));
       if (beating) beat();
       while (session.deadline() && *session.deadline() <= now) session.on_deadline(now);
     }
@@ -130,7 +129,7 @@ class Rig {
     return r;
   }
 
-  TimePoint now{1000s};
+  TimePoint now{std::chrono::seconds(1000)};
   std::array<std::uint16_t, kRequestLength> block{};
   Session session;
 };
