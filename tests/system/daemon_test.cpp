@@ -1,0 +1,162 @@
+#include <fstream>
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include "tests/support/scenes.hpp"
+#include "tests/system/system_cell.hpp"
+
+/// The real daemon over real sockets: what memory and virtual time cannot show.
+namespace binpick::support {
+namespace {
+using namespace std::chrono_literals;
+
+/// Sweeping: the pivot has left the start and profiles are collected.
+bool reach_sweep(SystemCell& cell) {
+  cell.plc().raise_request(1, 1);
+  if (!cell.run_until([&] { return cell.plc().busy() && cell.pivot_moves(); })) return false;
+  cell.run_for(900ms);  // past the drive to the start
+  return cell.run_until([&] { return cell.pivot_moves(); }, 2s);
+}
+}  // namespace
+
+TEST(Daemon, MakesAWholePick) {
+  SystemCell cell{{}, scene_of("track_link", 3, 2)};
+  ASSERT_TRUE(cell.run_until_ready());
+  const auto result = cell.pick();
+  ASSERT_TRUE(result.has_value());
+  EXPECT_EQ(result->code, plc::ResultCode::PickFound);
+  ASSERT_TRUE(cell.run_until([&] { return cell.robot().picks_done() == 1; }));
+}
+
+TEST(Daemon, KilledInASweepThePivotStopsByItselfAndThePlcSeesTheRestart) {
+  SystemCell cell{{}, scene_of("track_link", 3, 2)};
+  ASSERT_TRUE(cell.run_until_ready());
+  const auto boot = cell.plc().boot_count();
+  ASSERT_TRUE(reach_sweep(cell));
+  cell.signal(SIGKILL);
+  const SystemClock clock;
+  const TimePoint killed = clock.now();
+  ASSERT_TRUE(cell.run_until([&] { return !cell.pivot_moves(); }, 1s));
+  std::printf("the pivot stood %.0f ms after the kill\n", in_ms(clock.now() - killed));
+  ASSERT_TRUE(cell.run_until([&] { return cell.exit_status().has_value(); }, 1s));
+  cell.start_daemon();
+  ASSERT_TRUE(cell.run_until([&] { return cell.plc().boot_count() == boot + 1; }));
+  EXPECT_FALSE(cell.plc().result_valid());
+  ASSERT_TRUE(cell.run_until_ready());
+  const auto result = cell.pick();
+  ASSERT_TRUE(result.has_value());
+  EXPECT_EQ(result->code, plc::ResultCode::PickFound);
+}
+
+TEST(Daemon, TermInEachStateEndsItSafelyWithinTwoSeconds) {
+  enum class When { Ready, Sweeping, Detecting, ResultValid };
+  for (const When when : {When::Ready, When::Sweeping, When::Detecting, When::ResultValid}) {
+    SystemCell cell{{}, scene_of("track_link", 3, 2)};
+    ASSERT_TRUE(cell.run_until_ready());
+    cell.plc().hold_ack = true;
+    if (when == When::Sweeping) {
+      ASSERT_TRUE(reach_sweep(cell));
+    }
+    if (when == When::Detecting || when == When::ResultValid) {
+      cell.plc().raise_request(1, 1);
+      ASSERT_TRUE(
+          cell.run_until([&] { return when == When::Detecting ? cell.plc().scan_done() : cell.plc().result_valid(); }));
+    }
+    cell.signal(SIGTERM);
+    const SystemClock clock;
+    const TimePoint told = clock.now();
+    ASSERT_TRUE(cell.run_until([&] { return cell.exit_status().has_value(); }, 2s));
+    std::printf("state %d: ended after %.0f ms\n", static_cast<int>(when), in_ms(clock.now() - told));
+    EXPECT_EQ(cell.exit_status(), 0);
+    EXPECT_TRUE(cell.run_until([&] { return !cell.pivot_moves(); }, 300ms));
+  }
+}
+
+TEST(Daemon, ReloadsWhileCyclesRun) {
+  SystemCell cell{{}, scene_of("track_link", 3, 2)};
+  ASSERT_TRUE(cell.run_until_ready());
+  // A bad edit: alarm, and the old configuration goes on.
+  cell.plc().raise_request(1, 1);
+  ASSERT_TRUE(cell.run_until([&] { return cell.plc().busy(); }));
+  std::ofstream(cell.cell_path()) << to_toml(cell.file()) << "\nnonsense = 1\n";
+  cell.signal(SIGHUP);
+  std::optional<emulators::PlcResult> result;
+  ASSERT_TRUE(cell.run_until([&] { return (result = cell.plc().take_result()).has_value(); }));
+  EXPECT_EQ(result->code, plc::ResultCode::PickFound);
+  EXPECT_TRUE(cell.run_until([&] { return cell.plc().alarms_seen().contains(plc::Alarm::ConfigurationRefused); }, 2s));
+  EXPECT_NE(cell.daemon_log().find("system.toml"), std::string::npos);
+  // A good one: in force at the next cycle, and the alarm's cause is gone.
+  ASSERT_TRUE(cell.run_until([&] { return cell.plc().ready() && cell.robot().clear_of_view(); }));
+  cell.plc().raise_request(1, 1);
+  ASSERT_TRUE(cell.run_until([&] { return cell.plc().busy(); }));
+  CellFile edited = cell.file();
+  edited.tilt_max_deg = 0.1;
+  std::ofstream(cell.cell_path()) << to_toml(edited);
+  cell.signal(SIGHUP);
+  ASSERT_TRUE(cell.run_until([&] { return (result = cell.plc().take_result()).has_value(); }));
+  EXPECT_EQ(result->code, plc::ResultCode::PickFound);
+  ASSERT_TRUE(cell.run_until([&] { return cell.daemon_log().find("is in force") != std::string::npos; }, 5s));
+  ASSERT_TRUE(cell.run_until([&] { return cell.plc().ready() && cell.robot().clear_of_view(); }));
+  result = cell.pick();
+  ASSERT_TRUE(result.has_value());
+  EXPECT_EQ(result->code, plc::ResultCode::NotReachable);
+  EXPECT_FALSE(cell.plc().alarm_active());
+}
+
+TEST(Daemon, RefusesABadFileAtTheStart) {
+  const std::string path = test_folder().write({}, "refused.toml");
+  std::ofstream(path, std::ios::app) << "\n[[part]]\nid = 1\n";
+  const auto ended = run_program(BINPICKD_PROGRAM, {"--config", path});
+  EXPECT_EQ(ended.status, 78);
+  EXPECT_NE(ended.errors.find("refused.toml:"), std::string::npos) << ended.errors;
+}
+
+TEST(Daemon, OneFaultOfEachDeviceOverSockets) {
+  SystemCell cell{{}, scene_of("track_link", 3, 2)};
+  ASSERT_TRUE(cell.run_until_ready());
+  const auto recovers = [&](const char* what, plc::Alarm alarm) {
+    SCOPED_TRACE(what);
+    ASSERT_TRUE(cell.run_until([&] { return !cell.pivot_moves(); }, 1s));
+    if (cell.run_until([&] { return cell.plc().fault(); }, 1s)) cell.plc().raise_reset();
+    const SystemClock clock;
+    const TimePoint healed = clock.now();
+    ASSERT_TRUE(cell.run_until([&] { return cell.plc().ready() && cell.plc().idle(); }, 5s));
+    std::printf("%s: ready again after %.2f s\n", what, in_s(clock.now() - healed));
+    EXPECT_TRUE(cell.plc().alarms_seen().contains(alarm));
+    const auto picks = cell.robot().picks_done();
+    const auto result = cell.pick();
+    ASSERT_TRUE(result.has_value());
+    EXPECT_EQ(result->code, plc::ResultCode::PickFound);
+    ASSERT_TRUE(cell.run_until([&] { return cell.robot().picks_done() > picks && cell.robot().clear_of_view(); }));
+    cell.plc().forget_alarms_seen();
+  };
+  ASSERT_TRUE(reach_sweep(cell));
+  cell.pivot().with([](emulators::Pivot& pivot) { pivot.faults.emergency_stop = true; });
+  cell.pivot().wake();
+  ASSERT_TRUE(cell.run_until([&] { return cell.plc().fault(); }, 3s));
+  cell.pivot().with([](emulators::Pivot& pivot) { pivot.faults = {}; });
+  cell.pivot().wake();
+  recovers("pivot, emergency stop", plc::Alarm::PivotPowerFault);
+
+  ASSERT_TRUE(reach_sweep(cell));
+  cell.scanner().faults.unplugged = true;
+  ASSERT_TRUE(cell.run_until([&] { return cell.plc().fault(); }, 3s));
+  cell.scanner().faults = {};
+  recovers("scanner, pulled", plc::Alarm::ScannerNoReply);
+
+  const auto picks = cell.robot().picks_done();
+  ASSERT_TRUE(reach_sweep(cell));
+  cell.robot().faults.unplugged = true;
+  ASSERT_TRUE(cell.run_until([&] { return cell.plc().alarms_seen().contains(plc::Alarm::RobotLost); }, 3s));
+  cell.robot().faults = {};
+  ASSERT_TRUE(cell.run_until([&] { return cell.robot().picks_done() > picks && cell.robot().clear_of_view(); }));
+  recovers("robot, pulled", plc::Alarm::RobotLost);
+
+  ASSERT_TRUE(reach_sweep(cell));
+  cell.plc().faults.unplugged = true;
+  cell.run_for(5s);
+  EXPECT_FALSE(cell.pivot_moves());
+  cell.plc().faults = {};
+  recovers("plc, pulled", plc::Alarm::PlcLost);
+}
+}  // namespace binpick::support
