@@ -232,8 +232,8 @@ class Detecting {
     return candidates;
   }
 
-  /// Parts look much alike from both sides, or end for end. The strongest candidates are tried in the quarter and half
-  /// turns about the part's principal axes that are no symmetry: either the turned one is better, or how much worse it
+  /// Parts look much alike from both sides, or end for end. The strongest candidates are tried in the turns about
+  /// the part's principal axes that are no symmetry: either the turned one is better, or how much worse it
   /// is tells how sure the first one is.
   void add_turned(std::vector<Candidate>& candidates) const {
     std::vector<Candidate> strongest;
@@ -258,26 +258,36 @@ class Detecting {
       if (c.test.evidence > 0) candidates.push_back(c);
   }
 
+  /// Quarter turns about the principal axes; steps of 15 degrees about an axis that the part is nearly round about (a
+  /// wheel's spokes are found by the next edge only). None that the symmetry makes another's equal.
   std::vector<Eigen::Matrix3f> principal_turns() const {
+    constexpr double kNearlyRound = 0.8;
+    constexpr double kStepRad = std::numbers::pi / 12;
     Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
     for (const Eigen::Vector3f& v : part_.mesh.vertices_mm) {
       const Eigen::Vector3d d = (v - centroid_).cast<double>();
       spread += d * d.transpose();
     }
-    const Eigen::Matrix3d axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors();
-    std::vector<Eigen::Matrix3f> turns;
-    for (int axis = 0; axis < 3; ++axis)
-      for (const int quarters : {1, 2, 3}) {
-        const Eigen::Matrix3d turn =
-            Eigen::AngleAxisd(0.5 * std::numbers::pi * quarters, axes.col(axis).normalized()).toRotationMatrix();
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> principal(spread);
+    const Eigen::Vector3d centroid = centroid_.cast<double>();
+    std::vector<Eigen::Isometry3d> distinct{Eigen::Isometry3d::Identity()};
+    for (int axis = 0; axis < 3; ++axis) {
+      const double a = principal.eigenvalues()[(axis + 1) % 3], b = principal.eigenvalues()[(axis + 2) % 3];
+      const int steps = std::min(a, b) > kNearlyRound * std::max(a, b) ? 1 : 6;
+      for (int k = steps; k < 24; k += steps) {
         Eigen::Isometry3d moved = Eigen::Isometry3d::Identity();
-        const Eigen::Vector3d centroid = centroid_.cast<double>();
-        moved.linear() = turn;
-        moved.translation() = centroid - turn * centroid;
-        const PoseDistance distance = pose_distance(Eigen::Isometry3d::Identity(), moved, part_.symmetry, radius_mm_);
-        if (distance.angle_rad > 0.1 || distance.centroid_mm > 0.05 * part_.diameter_mm)
-          turns.push_back(turn.cast<float>());
+        moved.linear() =
+            Eigen::AngleAxisd(kStepRad * k, principal.eigenvectors().col(axis).normalized()).toRotationMatrix();
+        moved.translation() = centroid - moved.linear() * centroid;
+        const bool again = std::any_of(distinct.begin(), distinct.end(), [&](const Eigen::Isometry3d& other) {
+          const PoseDistance d = pose_distance(other, moved, part_.symmetry, radius_mm_);
+          return d.angle_rad < 0.1 && d.centroid_mm < 0.05 * part_.diameter_mm;
+        });
+        if (!again) distinct.push_back(moved);
       }
+    }
+    std::vector<Eigen::Matrix3f> turns;
+    for (std::size_t k = 1; k < distinct.size(); ++k) turns.push_back(distinct[k].linear().cast<float>());
     return turns;
   }
 
