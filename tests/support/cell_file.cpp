@@ -7,9 +7,6 @@
 #include <stdexcept>
 #include <unistd.h>
 
-#include "tests/emulators/world/example_parts.hpp"
-#include "vision/knowledge_base.hpp"
-
 namespace binpick::support {
 namespace fs = std::filesystem;
 
@@ -24,14 +21,16 @@ std::string to_toml(const CellFile& file) {
       << "[scanner]\nmodel = \"lms400\"\naddress = \"127.0.0.1:" << file.scanner_port
       << "\"\nfrequency_hz = 360\nresolution_deg = 0.25\nstart_deg = 70\nrange_deg = 40\nlatency_ms = "
       << file.scanner_latency_ms << "\nT_pivot_scanner = { xyz_mm = [60, 0, 0], rpy_deg = [180, -90, 0] }\n\n"
-      << "[robot]\ndialect = \"ur\"\nsilence_max_s = 5\nlisten = \"127.0.0.1:" << file.robot_port << "\"\nallow = []\n\n"
+      << "[robot]\ndialect = \"ur\"\nsilence_max_s = 5\nlisten = \"127.0.0.1:" << file.robot_port
+      << "\"\nallow = []\n\n"
       << "[reach]\ntilt_max_deg = " << file.tilt_max_deg << "\n\n[detection]\nthreads = 2\ndeadline_ms = 3000\n\n"
       << "[[supply]]\nid = 1\nname = \"lattice box\"\nsize_mm = [1000, 800, 500]\n"
       << "T_base_supply = { xyz_mm = [1200, 0, 0], rpy_deg = [0, 0, 0] }\nsweep_start_deg = -15\nsweep_end_deg = 15\n"
       << "sweep_speed_deg_s = " << file.sweep_speed_deg_s << "\n";
   int id = 0;
   for (const auto& part : file.parts)
-    out << "\n[[part]]\nid = " << ++id << "\nfile = \"parts/" << part << ".toml\"\nknowledge_base = \"" << part
+    out << "\n[[part]]\nid = " << ++id << "\nfile = \"" << BINPICK_TEST_PARTS << "/" << part
+        << ".toml\"\nknowledge_base = \"" << BINPICK_TEST_PARTS << "/" << part
         << ".kb\"\nscore_min = " << file.score_min << "\n";
   return out.str();
 }
@@ -47,21 +46,7 @@ TestFolder::~TestFolder() {
   fs::remove_all(path_, ignored);
 }
 
-void TestFolder::need_part(const std::string& name) {
-  const std::string knowledge = path_ + "/" + name + ".kb";
-  if (fs::exists(knowledge)) return;
-  const std::string part_file = emulators::write_example_part(name, path_ + "/parts");
-  const auto part = config::load_part(part_file);
-  if (!part) throw std::runtime_error(to_string(part.error().front()));
-  const auto mesh = vision::load_mesh(part->mesh_path, part->mesh_unit_mm);
-  if (!mesh) throw std::runtime_error(mesh.error().text);
-  const auto trained = vision::train(*mesh, part->options, {}, nullptr);
-  if (!trained) throw std::runtime_error(trained.error().text);
-  if (const auto saved = trained->save(knowledge); !saved) throw std::runtime_error(saved.error().text);
-}
-
 std::string TestFolder::write(const CellFile& file, const std::string& name) {
-  for (const auto& part : file.parts) need_part(part);
   const std::string file_path = path_ + "/" + name;
   std::ofstream(file_path) << to_toml(file);
   return file_path;

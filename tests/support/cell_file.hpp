@@ -11,7 +11,7 @@ namespace binpick::support {
 /// What tests vary in a cell file; the rest is one LMS 400 cell: a lattice box under a pivot.
 struct CellFile {
   std::string word_order = "s7";
-  std::vector<std::string> parts = {"track_link"};  ///< Example parts; ids 1, 2, ….
+  std::vector<std::string> parts = {"track_link"};  ///< Example parts that the build has trained; ids 1, 2, ….
   double tilt_max_deg = 45;
   double score_min = 0.5;
   double sweep_speed_deg_s = 25;
@@ -25,8 +25,7 @@ struct CellFile {
 
 std::string to_toml(const CellFile& file);
 
-/// A folder of its own for one test program, with the example parts in it and a knowledge base for each, trained on
-/// first use. Removed at the end of the program.
+/// A folder of its own for one test program, removed at its end.
 class TestFolder {
  public:
   TestFolder();
@@ -35,13 +34,12 @@ class TestFolder {
   TestFolder& operator=(const TestFolder&) = delete;
 
   const std::string& path() const { return path_; }
-  /// Writes `name` and trains what it names; returns its path.
+  /// Returns the path of what was written.
   std::string write(const CellFile& file, const std::string& name = "cell.toml");
   /// write() and load: a file that tests wrote is good.
   std::shared_ptr<const daemon::CellData> load(const CellFile& file);
 
  private:
-  void need_part(const std::string& name);
   std::string path_;
 };
 
