@@ -25,9 +25,10 @@ constexpr std::size_t kDistinctBest = 240;
 constexpr std::size_t kTurnedBest = 16;
 constexpr std::size_t kRejectionsMax = 20;
 constexpr double kSparseToleranceDiameters = 0.035;
-/// A grid rotation is several degrees off, which moves the lowest point against the highest by so much: a narrower gate
-/// silently loses what lies flat on the floor.
+/// A rotation of a grid of 10 000 is up to nine degrees off, which moves the lowest point against the highest by so
+/// much: a narrower gate silently loses what lies flat on the floor.
 constexpr double kFloorGateDiameters = 0.12;
+constexpr double kUsualRotations = 10'000;
 constexpr double kWallGateDiameters = 0.04;
 constexpr double kSameDiameters = 0.12;
 /// Below this a hypothesis is no detection.
@@ -83,7 +84,7 @@ class Detecting {
     scene_ = prepare_scene(image_, noise_mm_);
     floor_mm_ = floor_of(scene_, supply_);
     lowest_allowed_mm_ =
-        static_cast<float>(floor_mm_ - std::max(3 * noise_mm_, kFloorGateDiameters * part_.diameter_mm));
+        static_cast<float>(floor_mm_ - std::max(3 * noise_mm_, kFloorGateDiameters * coarseness() * part_.diameter_mm));
     ended("surface");
     const std::vector<Eigen::Vector3f> maxima = anchors();
     report_.maxima = maxima.size();
@@ -111,6 +112,15 @@ class Detecting {
   void ended(const char* stage) {
     report_.stages_ms[stage] = milliseconds_since(stage_start_);
     stage_start_ = SteadyClock::now();
+  }
+
+  /// How far apart the training rotations are, against the usual grid: a rotation's error goes with the cube root of
+  /// their number.
+  double coarseness() const {
+    const bool finite = part_.symmetry.kind == Symmetry::Kind::None || part_.symmetry.kind == Symmetry::Kind::Finite;
+    if (!finite || part_.views.empty()) return 1;
+    const double order = std::max<double>(1, static_cast<double>(part_.symmetry.rotations.size()));
+    return std::clamp(std::cbrt(kUsualRotations / (order * static_cast<double>(part_.views.size()))), 0.8, 2.0);
   }
 
   std::vector<Eigen::Vector3f> anchors() const {
@@ -144,8 +154,8 @@ class Detecting {
 
   std::vector<Hypothesis> tested(const std::vector<Eigen::Vector3f>& maxima, const std::vector<Ballot>& ballots) {
     report_.hypotheses = ballots.size();
-    const auto tolerance = static_cast<float>(
-        std::max(kSparseToleranceDiameters * part_.diameter_mm, static_cast<double>(tolerance_of(scene_))));
+    const auto tolerance = static_cast<float>(std::max(kSparseToleranceDiameters * coarseness() * part_.diameter_mm,
+                                                       static_cast<double>(tolerance_of(scene_))));
     std::vector<float> evidence(ballots.size(), -1);
     constexpr std::size_t kBlock = 64;
     share(options_.threads, (ballots.size() + kBlock - 1) / kBlock, deadline_, [&](std::size_t block, int) {

@@ -16,6 +16,8 @@ constexpr double kClaimedMax = 0.5;
 constexpr double kInsideMax = 0.12;
 /// A rival has to speak of mostly the same pixels.
 constexpr double kRivalShare = 0.6;
+/// Share of the evidence that noise makes differ.
+constexpr double kRivalScale = 0.012;
 
 std::string percent(const char* text, double share) {
   std::array<char, 100> line{};
@@ -65,9 +67,10 @@ double displacement_mm(const Candidate& a, const Candidate& b, const Symmetry& s
 double score_of(const Candidate& candidate) {
   const DenseTest& t = candidate.test;
   const double logit = -4.0 + 4.0 * std::min(1.0F, t.visible_fraction() / 0.6F) - 14.0 * t.contradicted_ratio() +
-                       3.0 * t.edge_ratio() + 3.0 * (t.normal_agreement - 0.5) + 2.0 * t.bend_agreement -
-                       6.0 * std::max(0.0F, candidate.rival - 0.6F);
-  return 1 / (1 + std::exp(-logit));
+                       3.0 * t.edge_ratio() + 3.0 * (t.normal_agreement - 0.5) + 2.0 * t.bend_agreement;
+  // A rival that explains as much is as likely; evidence that differs by a few per cent decides.
+  const double against_rival = 1 / (1 + std::exp((candidate.rival - 1) / kRivalScale));
+  return against_rival / (1 + std::exp(-logit));
 }
 
 std::vector<Selected> select(const Scene& scene, const Rasteriser& part, const Symmetry& symmetry,

@@ -1,0 +1,182 @@
+#include "vision/detector.hpp"
+
+#include <cmath>
+#include <gtest/gtest.h>
+#include <limits>
+#include <numbers>
+
+#include "tests/unit/detect/scenes.hpp"
+#include "vision/symmetry.hpp"
+
+namespace binpick::vision {
+namespace {
+using scenes::bracket_base;
+using scenes::kSupply;
+using scenes::pose;
+constexpr double kDegree = std::numbers::pi / 180;
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+
+struct Error {
+  double mm = 1e9, deg = 1e9;
+};
+/// Of the detection nearest to the truth.
+Error error_of(const DetectionReport& report, const Eigen::Isometry3d& truth) {
+  Error least;
+  for (const Detection& d : report.detections) {
+    const PoseDistance distance = pose_distance(d.T_supply_object.iso, truth, bracket_base().symmetry(), 60);
+    if (distance.centroid_mm < least.mm) least = {distance.centroid_mm, distance.angle_rad / kDegree};
+  }
+  return least;
+}
+
+DetectionReport detect_in(const DepthImage& image) { return detect(image, kSupply, bracket_base(), scenes::options()); }
+
+TEST(Detector, OneObjectInManyPoses) {
+  const std::vector<Eigen::Isometry3d> poses{pose(40, -30, 0, 0.3), pose(-100, 60, 45, 2.0, -std::numbers::pi / 2),
+                                             pose(0, 0, 45, -1.2, std::numbers::pi / 2), pose(120, 80, 60, 0.9, 0.35),
+                                             pose(-60, -90, 90, 2.7, std::numbers::pi - 0.3)};
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    const DetectionReport report =
+        detect_in(scenes::image_of(bracket_base().mesh(), {poses[k]}, static_cast<std::uint32_t>(k)));
+    ASSERT_EQ(report.detections.size(), 1U) << "pose " << k;
+    const Error error = error_of(report, poses[k]);
+    EXPECT_LT(error.mm, 1.5) << "pose " << k;
+    EXPECT_LT(error.deg, 1.0) << "pose " << k;
+    EXPECT_GT(report.detections[0].score, 0.9) << "pose " << k;
+    EXPECT_GT(report.detections[0].visible_fraction, 0.8) << "pose " << k;
+    EXPECT_GT(report.maxima, 0U);
+    EXPECT_GT(report.hypotheses, 0U);
+  }
+}
+
+TEST(Detector, SeveralObjectsEachOnce) {
+  const std::vector<Eigen::Isometry3d> truth{pose(-180, -120, 0, 0.3), pose(-180, 110, 45, 1.0, std::numbers::pi / 2),
+                                             pose(30, 0, 0, 2.2), pose(180, 130, 0, -0.7),
+                                             pose(170, -120, 30, 0.1, 0.2)};
+  const DetectionReport report = detect_in(scenes::image_of(bracket_base().mesh(), truth, 5));
+  EXPECT_EQ(report.detections.size(), truth.size());
+  for (std::size_t k = 0; k < truth.size(); ++k) {
+    EXPECT_LT(error_of(report, truth[k]).mm, 1.5) << "object " << k;
+    EXPECT_LT(error_of(report, truth[k]).deg, 1.2) << "object " << k;
+  }
+  for (std::size_t k = 1; k < report.detections.size(); ++k)
+    EXPECT_GE(report.detections[k - 1].score, report.detections[k].score);
+}
+
+TEST(Detector, AHalfHiddenObjectIsFoundAndSaysSo) {
+  const Eigen::Isometry3d below = pose(0, 0, 0, 0), above = pose(75, 10, 72, 1.5);
+  const DetectionReport report = detect_in(scenes::image_of(bracket_base().mesh(), {below, above}, 9));
+  EXPECT_LT(error_of(report, above).mm, 1.5);
+  ASSERT_LT(error_of(report, below).mm, 3);
+  EXPECT_LT(error_of(report, below).deg, 2);
+  for (const Detection& d : report.detections) {
+    const bool is_below = (d.T_supply_object.iso.translation() - below.translation()).norm() < 20;
+    EXPECT_TRUE(!is_below || d.visible_fraction < 0.8) << d.visible_fraction;
+  }
+}
+
+// From below the bracket shows a plain rectangle: half a turn about the vertical cannot be told.
+TEST(Detector, WhatTwoPosesExplainAlikeIsNotBelieved) {
+  const DetectionReport report =
+      detect_in(scenes::image_of(bracket_base().mesh(), {pose(0, 0, 70, 2.0, std::numbers::pi)}, 1));
+  ASSERT_EQ(report.detections.size(), 1U);
+  EXPECT_LT(report.detections[0].score, 0.85);
+}
+
+TEST(Detector, TheCovarianceHoldsTheError) {
+  const Eigen::Isometry3d truth = pose(10, 20, 0, 0.5);
+  int outside = 0;
+  for (std::uint32_t seed = 0; seed < 8; ++seed) {
+    const DetectionReport report = detect_in(scenes::image_of(bracket_base().mesh(), {truth}, seed));
+    ASSERT_FALSE(report.detections.empty());
+    const Matrix6& covariance = report.detections[0].covariance;
+    EXPECT_TRUE(covariance.isApprox(covariance.transpose()));
+    EXPECT_GT(covariance.diagonal().minCoeff(), 0);
+    const Eigen::Vector3d centroid = bracket_base().mesh().centroid_mm();
+    const Eigen::Vector3d off = report.detections[0].T_supply_object.iso * centroid - truth * centroid;
+    for (int axis = 0; axis < 3; ++axis) outside += std::abs(off[axis]) > 4 * std::sqrt(covariance(axis, axis)) + 0.3;
+  }
+  EXPECT_LE(outside, 2);
+}
+
+TEST(Detector, AnEmptyFloorAndWallsAreNoDetection) {
+  DepthImage floor = scenes::image_of(bracket_base().mesh(), {}, 3);
+  EXPECT_TRUE(detect_in(floor).detections.empty());
+  EXPECT_TRUE(detect(floor, {}, bracket_base(), scenes::options()).detections.empty());
+  // Walls: 300 mm high, three pixels inside the picture.
+  floor.z_mm.leftCols(3) = floor.z_mm.rightCols(3) = 300;
+  floor.z_mm.topRows(3) = floor.z_mm.bottomRows(3) = 300;
+  EXPECT_TRUE(detect_in(floor).detections.empty());
+  EXPECT_TRUE(detect(floor, {}, bracket_base(), scenes::options()).detections.empty());
+}
+
+TEST(Detector, WithoutASupplySizeItWorksAsWell) {
+  const Eigen::Isometry3d truth = pose(40, -30, 0, 0.3);
+  const DetectionReport report =
+      detect(scenes::image_of(bracket_base().mesh(), {truth}, 4), {}, bracket_base(), scenes::options());
+  ASSERT_EQ(report.detections.size(), 1U);
+  EXPECT_LT(error_of(report, truth).mm, 1.5);
+}
+
+TEST(Detector, AnotherPartIsNotTakenForThisOne) {
+  const Mesh other = shapes::scaled(shapes::bracket(), 0.6F);
+  const DetectionReport report = detect_in(scenes::image_of(other, {pose(0, 0, 0, 0.4), pose(120, 90, 0, 1.4)}, 6));
+  for (const Detection& d : report.detections) EXPECT_LT(d.score, 0.5);
+}
+
+TEST(Detector, GarbageIsNoDetectionAndNoCrash) {
+  const DepthImage good = scenes::image_of(bracket_base().mesh(), {pose(0, 0, 0, 0)}, 2);
+  for (const float value : {kNan, 1e30F, -1e30F, std::numeric_limits<float>::infinity(), 0.0F}) {
+    DepthImage bad = good;
+    bad.z_mm.setConstant(value);
+    EXPECT_TRUE(detect_in(bad).detections.empty()) << value;
+  }
+  std::mt19937 random{3};
+  DepthImage wild = good;
+  for (float& z : wild.z_mm.reshaped()) z = static_cast<float>(random() % 1000);
+  for (const Detection& d : detect_in(wild).detections) EXPECT_LT(d.score, 0.5);
+  DepthImage none;
+  EXPECT_TRUE(detect_in(none).detections.empty());
+  DepthImage one;
+  one.z_mm.setConstant(1, 1, 5);
+  EXPECT_TRUE(detect_in(one).detections.empty());
+}
+
+TEST(Detector, TheResultDoesNotDependOnTheThreads) {
+  const DepthImage image =
+      scenes::image_of(bracket_base().mesh(),
+                       {pose(-150, -60, 0, 0.3), pose(60, 50, 70, 1.0, std::numbers::pi), pose(90, 20, 70, 2)}, 7);
+  DetectorOptions options = scenes::options();
+  options.threads = 1;
+  const DetectionReport expected = detect(image, kSupply, bracket_base(), options);
+  ASSERT_FALSE(expected.detections.empty());
+  for (const int threads : {2, 3, 5, 2}) {
+    options.threads = threads;
+    const DetectionReport report = detect(image, kSupply, bracket_base(), options);
+    ASSERT_EQ(report.detections.size(), expected.detections.size());
+    ASSERT_EQ(report.rejected.size(), expected.rejected.size());
+    for (std::size_t k = 0; k < report.detections.size(); ++k) {
+      EXPECT_EQ(report.detections[k].T_supply_object.iso.matrix(), expected.detections[k].T_supply_object.iso.matrix());
+      EXPECT_EQ(report.detections[k].score, expected.detections[k].score);
+    }
+  }
+}
+
+TEST(Detector, ADeadlineInThePastStillReturns) {
+  DetectorOptions options = scenes::options();
+  options.deadline = std::chrono::milliseconds{0};
+  const DetectionReport report =
+      detect(scenes::image_of(bracket_base().mesh(), {pose(0, 0, 0, 0)}, 2), kSupply, bracket_base(), options);
+  EXPECT_TRUE(report.detections.empty());
+}
+
+TEST(Detector, MaxLimitsTheList) {
+  DetectorOptions options = scenes::options();
+  options.detections_max = 1;
+  const DetectionReport report =
+      detect(scenes::image_of(bracket_base().mesh(), {pose(-150, 0, 0, 0), pose(150, 0, 0, 1)}, 2), kSupply,
+             bracket_base(), options);
+  EXPECT_EQ(report.detections.size(), 1U);
+}
+}  // namespace
+}  // namespace binpick::vision
