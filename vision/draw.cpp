@@ -7,8 +7,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "vision/knowledge_base_impl.hpp"
 #include "vision/rasteriser.hpp"
+#include "vision/scene.hpp"
 
 namespace binpick::vision {
 namespace {
@@ -94,10 +94,15 @@ cv::Mat shaded(const DepthImage& image, const HeightRange& range, int scale) {
   return large;
 }
 
-using Outline = std::vector<std::vector<cv::Point>>;
+/// One closed line of a silhouette, in the picture's pixels.
+struct Contour {
+  std::vector<cv::Point> points;
+  std::vector<char> hidden;  ///< Something measured lies above the part there.
+};
 
-/// Silhouette of the part at a pose, in the picture's pixels, holes included.
-Outline outline_of(const Canvas& canvas, const Rasteriser& part, const Transform<frame::Supply, frame::Object>& T) {
+/// Silhouette of the part at a pose, holes included.
+std::vector<Contour> outline_of(const Canvas& canvas, const DepthImage& image, const Rasteriser& part, float jump_mm,
+                                const Transform<frame::Supply, frame::Object>& T) {
   const double fine_mm = canvas.pixel_mm / canvas.scale;
   Template drawn;
   part.draw(T.iso.linear().cast<float>(), T.iso.translation().cast<float>(), fine_mm, canvas.origin_mm, drawn);
@@ -106,28 +111,42 @@ Outline outline_of(const Canvas& canvas, const Rasteriser& part, const Transform
   for (int r = 0; r < drawn.rows; ++r)
     for (int c = 0; c < drawn.cols; ++c)
       if (drawn.triangle[drawn.at(r, c)] >= 0) mask.at<uchar>(r + 1, c + 1) = 255;
-  Outline outline;
-  cv::findContours(mask, outline, cv::RETR_CCOMP, cv::CHAIN_APPROX_NONE);
-  std::erase_if(outline, [](const auto& contour) { return contour.size() < 12; });
-  for (auto& contour : outline)
-    for (cv::Point& p : contour) {
-      const cv::Point2d q = canvas.at(canvas.origin_mm.x() + (p.x - 1 + drawn.col0) * fine_mm,
-                                      canvas.origin_mm.y() + (p.y - 1 + drawn.row0) * fine_mm);
-      p = {static_cast<int>(std::lround(q.x)), static_cast<int>(std::lround(q.y))};
+  std::vector<std::vector<cv::Point>> lines;
+  cv::findContours(mask, lines, cv::RETR_CCOMP, cv::CHAIN_APPROX_NONE);
+  std::vector<Contour> outline;
+  for (const auto& line : lines) {
+    if (line.size() < 12) continue;
+    Contour contour;
+    for (const cv::Point& p : line) {
+      const double x_mm = canvas.origin_mm.x() + (p.x - 1 + drawn.col0) * fine_mm;
+      const double y_mm = canvas.origin_mm.y() + (p.y - 1 + drawn.row0) * fine_mm;
+      contour.points.emplace_back(canvas.at(x_mm, y_mm));
+      const auto col = static_cast<Eigen::Index>(std::lround((x_mm - image.origin_mm.x()) / image.pixel_mm));
+      const auto row = static_cast<Eigen::Index>(std::lround((y_mm - image.origin_mm.y()) / image.pixel_mm));
+      const bool inside = row >= 0 && col >= 0 && row < image.z_mm.rows() && col < image.z_mm.cols();
+      const int r = std::clamp(p.y - 1, 0, drawn.rows - 1), c = std::clamp(p.x - 1, 0, drawn.cols - 1);
+      contour.hidden.push_back(inside && image.z_mm(row, col) - drawn.top_mm[drawn.at(r, c)] > jump_mm);
     }
+    outline.push_back(std::move(contour));
+  }
   return outline;
 }
 
-void draw_outline(cv::Mat& picture, const Outline& outline, const cv::Scalar& colour, int width) {
-  cv::polylines(picture, outline, true, kHalo, width + 2, cv::LINE_AA);
-  cv::polylines(picture, outline, true, colour, width, cv::LINE_AA);
+void draw_dashed(cv::Mat& picture, const Contour& contour, const cv::Scalar& colour, bool only_hidden) {
+  constexpr std::size_t kDash = 9;
+  for (std::size_t k = 0; k + 1 < contour.points.size(); ++k)
+    if (k / kDash % 2 == 0 && (!only_hidden || contour.hidden[k]))
+      cv::line(picture, contour.points[k], contour.points[k + 1], colour, 1, cv::LINE_AA);
 }
 
-void draw_dashed(cv::Mat& picture, const Outline& outline, const cv::Scalar& colour) {
-  constexpr std::size_t kDash = 9;
-  for (const auto& contour : outline)
-    for (std::size_t k = 0; k + 1 < contour.size(); ++k)
-      if (k / kDash % 2 == 0) cv::line(picture, contour[k], contour[k + 1], colour, 1, cv::LINE_AA);
+/// Whole where the part is seen, fine dots where it is hidden.
+void draw_outline(cv::Mat& picture, const std::vector<Contour>& outline, const cv::Scalar& colour, int width) {
+  for (const auto& [pen, ink] : {std::pair{width + 2, kHalo}, {width, colour}})
+    for (const Contour& contour : outline)
+      for (std::size_t k = 0; k < contour.points.size(); ++k)
+        if (!contour.hidden[k])
+          cv::line(picture, contour.points[k], contour.points[(k + 1) % contour.points.size()], ink, pen, cv::LINE_AA);
+  for (const Contour& contour : outline) draw_dashed(picture, contour, colour, true);
 }
 
 void write_text(cv::Mat& picture, const std::string& text, cv::Point at, double size, const cv::Scalar& colour,
@@ -205,14 +224,20 @@ Expected<void, std::string> draw_report(const std::string& png_path, const Depth
   canvas.picture = shaded(image, range, canvas.scale);
 
   const Rasteriser rasteriser{part.mesh()};
+  const float jump_mm = jump_of(part.noise_mm(), image.pixel_mm);
   const Eigen::Vector3d centroid = part.mesh().centroid_mm();
   const auto label_place = [&](const Transform<frame::Supply, frame::Object>& T) {
     const Eigen::Vector3d p = T * centroid;
     return cv::Point(canvas.at(p.x(), p.y()));
   };
-  for (std::size_t k = 0; k < std::min(kRejectedDrawn, report.rejected.size()); ++k) {
-    const Rejection& rejection = report.rejected[k];
-    draw_dashed(canvas.picture, outline_of(canvas, rasteriser, rejection.T_supply_object), kRejectedInk);
+  // What a detection explains better needs no picture: its outline would lie beside the better one's.
+  std::vector<const Rejection*> shown;
+  for (const Rejection& rejection : report.rejected)
+    if (rejection.reason.find("better one") == std::string::npos) shown.push_back(&rejection);
+  for (std::size_t k = 0; k < std::min(kRejectedDrawn, shown.size()); ++k) {
+    const Rejection& rejection = *shown[k];
+    for (const Contour& contour : outline_of(canvas, image, rasteriser, jump_mm, rejection.T_supply_object))
+      draw_dashed(canvas.picture, contour, kRejectedInk, false);
     write_text(canvas.picture, rejection.reason, label_place(rejection.T_supply_object) + cv::Point(0, 18), 0.38,
                kRejectedInk, true);
   }
@@ -220,8 +245,8 @@ Expected<void, std::string> draw_report(const std::string& png_path, const Depth
   for (std::size_t k = report.detections.size(); k-- > 0;) {
     const Detection& detection = report.detections[k];
     const bool is_chosen = chosen != nullptr && chosen->detection == k;
-    const Outline outline = outline_of(canvas, rasteriser, detection.T_supply_object);
-    if (is_chosen) cv::polylines(canvas.picture, outline, true, kChosen, 9, cv::LINE_AA);
+    const std::vector<Contour> outline = outline_of(canvas, image, rasteriser, jump_mm, detection.T_supply_object);
+    if (is_chosen) draw_outline(canvas.picture, outline, kChosen, 9);
     draw_outline(canvas.picture, outline, colour_of(detection.score), is_chosen ? 4 : 2);
     write_text(canvas.picture, format("%zu: %.2f", k + 1, detection.score), label_place(detection.T_supply_object), 0.5,
                colour_of(detection.score), true);

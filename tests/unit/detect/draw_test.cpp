@@ -1,0 +1,53 @@
+#include "vision/draw.hpp"
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <gtest/gtest.h>
+#include <string>
+
+#include "tests/unit/detect/scenes.hpp"
+
+namespace binpick::vision {
+namespace {
+std::string png_path() { return (std::filesystem::path{testing::TempDir()} / "binpick_draw_test.png").string(); }
+
+TEST(Draw, WritesAPngWithEverythingOnIt) {
+  const DepthImage image =
+      scenes::image_of(scenes::bracket_base().mesh(), {scenes::pose(-100, 0, 0, 0), scenes::pose(60, 20, 72, 1.5)}, 2);
+  DetectionReport report = detect(image, scenes::kSupply, scenes::bracket_base(), scenes::options());
+  ASSERT_FALSE(report.detections.empty());
+  report.rejected.push_back({report.detections[0].T_supply_object, 0.1, "edges missing"});
+  const GraspChoice choice =
+      choose_grasps(report, scenes::bracket_base().symmetry(), {Grasp{}}, scenes::kSupply, {4.0});
+  ASSERT_FALSE(choice.reachable.empty());
+  std::filesystem::remove(png_path());
+  const auto drawn = draw_report(png_path(), image, scenes::bracket_base(), report, &choice.reachable.front());
+  ASSERT_TRUE(drawn.has_value()) << drawn.error();
+  std::ifstream in{png_path(), std::ios::binary};
+  std::string head(24, '\0');
+  in.read(head.data(), 24);
+  EXPECT_EQ(head.substr(1, 3), "PNG");
+  const auto width = static_cast<unsigned char>(head[18]) * 256 + static_cast<unsigned char>(head[19]);
+  EXPECT_GE(width, 1000);
+  std::filesystem::remove(png_path());
+}
+
+TEST(Draw, AnEmptyReportAndAnEmptyPicture) {
+  DepthImage blank;
+  EXPECT_FALSE(draw_report(png_path(), blank, scenes::bracket_base(), {}).has_value());
+  blank.z_mm.setConstant(5, 5, std::numeric_limits<float>::quiet_NaN());
+  EXPECT_TRUE(draw_report(png_path(), blank, scenes::bracket_base(), {}).has_value());
+  std::filesystem::remove(png_path());
+}
+
+TEST(Draw, APlaceThatCannotBeWrittenIsAnError) {
+  const DepthImage image = scenes::image_of(scenes::bracket_base().mesh(), {}, 2);
+  for (const char* path : {"/no/such/folder/x.png", "/tmp/picture.nosuchformat"}) {
+    const auto drawn = draw_report(path, image, scenes::bracket_base(), {});
+    ASSERT_FALSE(drawn.has_value());
+    EXPECT_NE(drawn.error().find(path), std::string::npos);
+  }
+}
+}  // namespace
+}  // namespace binpick::vision
