@@ -2,19 +2,15 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <assimp/Importer.hpp>
-#include <assimp/config.h>
-#include <assimp/postprocess.h>
-#include <assimp/scene.h>
 #include <bit>
 #include <cctype>
 #include <cmath>
 #include <cstring>
-#include <exception>
 #include <numbers>
 #include <unordered_map>
 
 #include "vision/file.hpp"
+#include "vision/mesh_file.hpp"
 
 namespace binpick::vision {
 namespace {
@@ -67,28 +63,6 @@ std::vector<Eigen::Vector3f> extreme_points(const std::vector<Eigen::Vector3f>& 
   return extremes;
 }
 
-/// Appends one assimp mesh; false when a vertex is not finite.
-bool append(const aiMesh& from, double unit_mm, Mesh& to) {
-  const auto base = static_cast<std::uint32_t>(to.vertices_mm.size());
-  for (unsigned i = 0; i < from.mNumVertices; ++i) {
-    const aiVector3D& v = from.mVertices[i];
-    const Eigen::Vector3f p = (Eigen::Vector3d(double{v.x}, double{v.y}, double{v.z}) * unit_mm).cast<float>();
-    if (!p.allFinite()) return false;
-    to.vertices_mm.push_back(p);
-  }
-  for (unsigned i = 0; i < from.mNumFaces; ++i) {
-    const aiFace& face = from.mFaces[i];
-    if (face.mNumIndices != 3) continue;  // Points and lines.
-    Triangle t{};
-    bool inside = true;
-    for (std::size_t k = 0; k < 3; ++k) {
-      inside = inside && face.mIndices[k] < from.mNumVertices;
-      t[k] = base + face.mIndices[k];
-    }
-    if (inside) to.triangles.push_back(t);
-  }
-  return true;
-}
 }  // namespace
 
 double Mesh::diameter_mm() const {
@@ -137,22 +111,12 @@ Expected<Mesh, MeshError> parse_mesh(std::span<const std::byte> bytes, const std
                                      const std::string& name) {
   const auto failed = [&](const std::string& why) { return unexpected(MeshError{"mesh " + name + ": " + why}); };
   if (bytes.empty()) return failed("the file is empty; export the part again");
-  Mesh mesh;
-  try {
-    Assimp::Importer importer;
-    importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
-    const aiScene* scene = importer.ReadFileFromMemory(
-        bytes.data(), bytes.size(), aiProcess_Triangulate | aiProcess_PreTransformVertices | aiProcess_SortByPType,
-        format.c_str());
-    if (scene == nullptr) {
-      const std::string why = importer.GetErrorString();
-      return failed("cannot be read as " + format + " or holds no triangle (" + why + "); export the part again");
-    }
-    for (unsigned i = 0; i < scene->mNumMeshes; ++i)
-      if (!append(*scene->mMeshes[i], unit_mm, mesh))
-        return failed("a vertex is not a finite number; repair the mesh and export it again");
-  } catch (const std::exception& error) {
-    return failed(std::string("cannot be read as ") + format + " (" + error.what() + "); export the part again");
+  auto read = format == "stl" ? read_stl(bytes) : format == "obj" ? read_obj(bytes) : read_ply_mesh(bytes);
+  if (!read) return failed(read.error());
+  Mesh mesh = std::move(*read);
+  for (Eigen::Vector3f& v : mesh.vertices_mm) {
+    v = (v.cast<double>() * unit_mm).cast<float>();
+    if (!v.allFinite()) return failed("a vertex is not a finite number; repair the mesh and export it again");
   }
   if (mesh.triangles.size() > kTrianglesMax)
     return failed("has " + std::to_string(mesh.triangles.size()) + " triangles, more than " +

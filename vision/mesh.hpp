@@ -24,7 +24,7 @@ struct MeshError {
   std::string text;  ///< What, where, what to do.
 };
 
-/// Reads STL, OBJ or PLY (assimp). `unit_mm` is the length of one file unit. No triangles, non-finite vertices or an
+/// Reads STL, OBJ or PLY. `unit_mm` is the length of one file unit. No triangles, non-finite vertices or an
 /// unreadable file are errors.
 Expected<Mesh, MeshError> load_mesh(const std::string& path, double unit_mm);
 /// The same for a file's bytes; `format` is "stl", "obj" or "ply", `name` stands in the messages.

@@ -67,7 +67,7 @@ TEST(Cloud, EveryTruncationIsAnErrorAndNeverRead) {
 TEST(Cloud, SaysWhatIsWrong) {
   const std::string ascii = "ply\nformat ascii 1.0\n";
   EXPECT_EQ(error_of(""), "cloud t.ply: the file is empty; scan or save it again");
-  EXPECT_EQ(error_of("hello\n"), "cloud t.ply: is not a PLY file; save the cloud as PLY");
+  EXPECT_EQ(error_of("hello\n"), "cloud t.ply: is not a PLY file; save it as PLY");
   EXPECT_EQ(error_of("ply\nformat binary_big_endian 1.0\n"),
             "cloud t.ply: line 2: format binary_big_endian is not read; save it as ascii or binary_little_endian");
   EXPECT_EQ(error_of(ascii + "element vertex 0\n" + kXyz + "end_header\n"), "cloud t.ply: holds no point; scan again");
@@ -78,11 +78,11 @@ TEST(Cloud, SaysWhatIsWrong) {
   EXPECT_EQ(error_of(ascii + "element vertex 1\nproperty list float int x\nend_header\n"),
             "cloud t.ply: line 4: unknown property type; use float or double for x, y and z");
   EXPECT_EQ(error_of(ascii + "element vertex x\n"),
-            "cloud t.ply: line 3: the number of elements is no number; save the cloud again");
-  EXPECT_EQ(error_of(ascii + "nonsense\n"), "cloud t.ply: line 3: cannot be understood; save the cloud again as PLY");
+            "cloud t.ply: line 3: the number of elements is no number; save it again");
+  EXPECT_EQ(error_of(ascii + "nonsense\n"), "cloud t.ply: line 3: cannot be understood; save it again as PLY");
   EXPECT_EQ(error_of(ascii + "end_header\n"),
-            "cloud t.ply: has no element vertex with properties; save the cloud as PLY with x, y, z");
-  EXPECT_EQ(error_of("ply\nend_header\n"), "cloud t.ply: names no format in its header; save the cloud again as PLY");
+            "cloud t.ply: has no element vertex with properties; save it as PLY with x, y, z");
+  EXPECT_EQ(error_of("ply\nend_header\n"), "cloud t.ply: names no format in its header; save it again as PLY");
   EXPECT_EQ(error_of(ascii + "element vertex 9999999999999\n" + kXyz + "end_header\n1 2 3\n"),
             "cloud t.ply: is truncated or damaged: vertex 1 of 9999999999999 cannot be read at byte 118; "
             "copy or save it again");

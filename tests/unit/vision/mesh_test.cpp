@@ -44,6 +44,38 @@ TEST(Mesh, ReadsObjAndPlyInTheirUnit) {
   EXPECT_NEAR((from_ply->centroid_mm() - Eigen::Vector3d(1, 4.0 / 3, 0)).norm(), 0, 1e-5);
 }
 
+TEST(Mesh, ReadsAsciiStlWithAnyLineEnds) {
+  const std::string text =
+      "solid \r\n facet normal 0 0 1\r\n  outer loop\r\n vertex 0 0 0\r\n vertex 1e1 0 0\r\n vertex 0 +20 0\r\n"
+      "  endloop\r\n endfacet\r\n facet normal 0 0 1\n outer loop\n vertex 10 0 0\n vertex 10 20 0\n vertex 0 20 0\n"
+      " endloop\n endfacet\nendsolid";
+  const auto mesh = load_mesh(written("ascii.STL", text), 1);
+  ASSERT_TRUE(mesh) << mesh.error().text;
+  EXPECT_EQ(mesh->vertices_mm.size(), 4U);
+  EXPECT_EQ(mesh->triangles.size(), 2U);
+}
+
+TEST(Mesh, ABinaryStlMayBeginWithSolid) {
+  const std::string path = testing::TempDir() + "solid_binary.stl";
+  ASSERT_TRUE(save_stl(shapes::box(1, 2, 3), path));
+  auto bytes = *read_file(path);
+  std::memcpy(bytes.data(), "solid box", 9);
+  EXPECT_EQ(parse_mesh(bytes, "stl", 1, "b.stl")->triangles.size(), 12U);
+  bytes.resize(bytes.size() - 30);
+  bytes[0] = std::byte{'x'};
+  EXPECT_EQ(parse_mesh(bytes, "stl", 1, "b.stl").error().text,
+            "mesh b.stl: is truncated: it says 12 triangles and holds 11; copy or export it again");
+}
+
+TEST(Mesh, ObjCornersMayNameTextureAndNormalAndCountBackwards) {
+  const std::string text =
+      "mtllib x.mtl\nv 0 0 0\nv 1 0 0 0.5 0.5 0.5\nv 0 1 0\nvn 0 0 1\nvt 0 0\nf 1/1 2//1 3/1/1\nv 0 0 1\nf -1 -2 -3\n";
+  const auto mesh = parse_mesh(std::as_bytes(std::span(text)), "obj", 1, "t.obj");
+  ASSERT_TRUE(mesh) << mesh.error().text;
+  EXPECT_EQ(mesh->triangles.size(), 2U);
+  EXPECT_EQ(mesh->vertices_mm.size(), 4U);
+}
+
 TEST(Mesh, SaysWhatIsWrong) {
   const auto text = [](const std::string& path) {
     const auto mesh = load_mesh(path, 1);
@@ -65,6 +97,15 @@ TEST(Mesh, SaysWhatIsWrong) {
   ASSERT_TRUE(write_file(path, bytes));
   EXPECT_NE(text(path).find("not a finite number"), std::string::npos);
   EXPECT_FALSE(load_mesh(testing::TempDir() + "box.stl", 0));
+  const auto obj = [&](const std::string& content) { return text(written("wrong.obj", content)); };
+  EXPECT_NE(obj("v 0 0 0\nf 1 2 3\n").find("line 2: a face names a vertex that is not there"), std::string::npos);
+  EXPECT_NE(obj("v 0 zero 0\n").find("line 1: a vertex needs three numbers"), std::string::npos);
+  EXPECT_NE(text(written("cut.ply", "ply\nformat ascii 1.0\nelement vertex 2\n")).find("truncated"), std::string::npos);
+  EXPECT_NE(text(written("wrong.ply",
+                         "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float "
+                         "z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n3 0 0 1\n"))
+                .find("face 0 names a vertex that is not there"),
+            std::string::npos);
 }
 
 TEST(Mesh, CleanedMergesAndDrops) {
