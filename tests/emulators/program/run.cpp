@@ -263,14 +263,14 @@ void Run::refill_when_low() {
 }
 
 void Run::tell_alarms() {
-  const plc::Alarm alarm = plc_->device.first_alarm();
-  if (alarm == alarm_told_) return;
-  alarm_told_ = alarm;
+  const Plc& plc = plc_->device;
+  const std::uint16_t total = plc.word(plc::at("alarms_total"));
+  if (total == alarms_told_) return;
+  alarms_told_ = total;
   for (const auto& text : plc::alarm_table())
-    if (text.alarm == alarm)
-      say("PLC: alarm %u, %s: %s %s", static_cast<unsigned>(alarm), std::string(text.name).c_str(),
+    if (text.alarm == plc.last_alarm())
+      say("PLC: alarm %u, %s: %s %s", static_cast<unsigned>(text.alarm), std::string(text.name).c_str(),
           std::string(text.cause).c_str(), std::string(text.cure).c_str());
-  if (alarm == plc::Alarm::None) say("PLC: no alarm any more");
 }
 
 void Run::read_commands(TimePoint now) {

@@ -82,7 +82,7 @@ class Run {
   bool pick_wanted_ = false;
   std::map<std::uint16_t, Pick> picks_;
   std::uint16_t picking_ = 0;
-  plc::Alarm alarm_told_ = plc::Alarm::None;
+  std::uint16_t alarms_told_ = 0;
   int done_ = 0, good_ = 0, without_pick_ = 0, without_pick_in_row_ = 0, refills_ = 0;
   double worst_mm_ = 0, worst_deg_ = 0;
 };
