@@ -189,7 +189,7 @@ a second), and read words 8 … 81 in every poll. All signals are levels: hold e
 2. Write the block with `control` = 0 (or 8: `robot_clear`) once. A request that already stands when the cell has just started
    is not carried out (result code 30); it has to be seen 0 first.
 3. Set `robot_clear` (bit 3) whenever the robot is out of the scanner's view, and clear it when it goes in. A request made
-   while it is 0 waits for it.
+   while it is 0 waits for it, until `plc.scan_timeout_ms` (alarm 502).
 4. Wait for `ready` (status bit 0). While it is 0, `not_ready` says why.
 5. Choose `sequence`: the last one plus 1 (65535 is followed by 1, never 0), and not equal to `ack_sequence`. Set `part_id`,
    `supply_id`, `result_ack` = 0 and the bit `request` (bit 0), all in the same write.

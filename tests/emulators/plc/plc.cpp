@@ -34,6 +34,7 @@ Plc::Plc(const PlcOptions& options) : options_{options} {}
 void Plc::on_connected(TimePoint now) {
   now_ = now;
   connected_ = true;
+  reopen_ = false;
   received_.clear();
   sending_.clear();
   job_ = Job::None;
