@@ -23,6 +23,8 @@ struct Options {
   std::chrono::milliseconds setpoint_horizon{
       200};  ///< While moving, the module knows no target further ahead than this.
   std::chrono::seconds reference_timeout{30};
+  bool passive =
+      false;  ///< Looks and does not touch: identifies and reads the state; no RESET, no reference run, no Ready.
   bool identify_only = false;  ///< For probing: Ready is said without a reference run, and moves are refused.
 };
 
@@ -70,6 +72,10 @@ class Session {
   std::vector<CanFrame> take_frames();
   std::optional<Event> take_event();
   State state() const;
+  /// What the module said of itself, once it has; kept when it goes silent.
+  std::optional<ModuleInfo> module() const;
+  /// The last state word (parameter 27), 0 before the first; state_in_words() says what it means.
+  std::uint32_t state_word() const;
 
   /// Only in Standing or Moving (else ignored and logged). Clamped to the module's limits.
   void move_to(Angle target, double speed_rad_s, TimePoint now);

@@ -109,6 +109,22 @@ TEST(PivotSession, ReadsPositionAndStateApartWhereTheFirmwareIsOld) {
   EXPECT_GE(bench.samples.size(), 9U);
 }
 
+TEST(PivotSession, PassiveLooksAndDoesNotTouch) {
+  PivotOptions module;
+  Options options;
+  options.passive = true;
+  Bench bench{module, options};
+  bench.run_for(300ms);
+  ASSERT_TRUE(bench.session.module());
+  EXPECT_EQ(bench.session.module()->serial, 12345678U);
+  bench.module.faults.emergency_stop = true;
+  bench.run_for(1s);
+  EXPECT_EQ(bench.session.state_word() & state::kMotorSupply, state::kMotorSupply);
+  EXPECT_EQ(bench.session.state(), State::Identifying);
+  EXPECT_EQ(bench.count<Ready>(), 0);
+  for (const CanFrame& frame : bench.sent) EXPECT_EQ(frame.id, 0x0CCU) << "reads alone";
+}
+
 // --- motion --------------------------------------------------------------------------------------------------------
 
 TEST(PivotSession, SweepsAtASteadySpeed) {

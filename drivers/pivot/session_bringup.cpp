@@ -1,0 +1,255 @@
+#include <algorithm>
+#include <array>
+
+#include "base/log.hpp"
+#include "drivers/pivot/session_impl.hpp"
+#include "drivers/pivot/state_word.hpp"
+
+namespace binpick::drivers::pivot {
+namespace {
+constexpr Duration kResetSettle = 100ms;  ///< Between RESET and the next look at the state.
+constexpr Duration kStatePollPassive = 500ms;
+constexpr Duration kBrakingMax = 500ms;  ///< Until an axis that still moves is halted once more.
+
+constexpr std::array kIdentity{Parameter::Firmware,    Parameter::SerialNumber,    Parameter::Config,
+                               Parameter::Setup,       Parameter::PositionMin,     Parameter::PositionMax,
+                               Parameter::VelocityMax, Parameter::AccelerationMax, Parameter::StateWord};
+}  // namespace
+
+std::optional<Request> Session::Impl::next_request_bringing_up() {
+  switch (phase) {
+    case Phase::Identify:
+      return Get{kIdentity[identity_index]};
+    case Phase::Recover:
+      if (std::exchange(halt_first, false)) return Plain{Command::Halt};
+      step_at = now + kResetSettle;
+      return Get{Parameter::StateWord};
+    case Phase::Reference:
+      step_at = now + kStatePoll;
+      if (!std::exchange(home_pending, false)) return Get{Parameter::StateWord};
+      BINPICK_LOG(Info, "pivot", "reference run");
+      return Plain{Command::Home};
+    default:
+      return std::nullopt;
+  }
+}
+
+void Session::Impl::fail_by_state(Failed::Why otherwise) {
+  const bool power = (word & state::kMotorSupply) != 0;
+  fail(power ? Failed::Why::PowerFault : otherwise, "pivot: " + faults_in_words(word));
+}
+
+Failed::Why Session::Impl::why_so_far() const {
+  const bool keep = failed == Failed::Why::ReferenceFailed || failed == Failed::Why::MoveRefused;
+  return keep ? *failed : Failed::Why::ModuleError;
+}
+
+void Session::Impl::be_ready() {
+  phase = Phase::Stand;
+  failed.reset();
+  references_failed = 0;
+  halt = Halt::None;
+  drop_move();
+  sample_at = state_at = now;
+  clean_sample_at = now;
+  last_sample.reset();
+  tell(Ready{module});
+}
+
+void Session::Impl::identify(Duration pause) {
+  if (phase == Phase::Move || phase == Phase::Reference) out.push_back(encode(options.module_id, Plain{Command::Halt}));
+  phase = Phase::Identify;
+  identity_index = 0;
+  repeated = false;
+  late_reads = 0;
+  doubles = 0;
+  outstanding.reset();
+  drop_move();
+  halt = Halt::None;
+  step_at = now + pause;
+}
+
+void Session::Impl::recover(bool with_halt) {
+  phase = Phase::Recover;
+  drop_move();
+  halt = Halt::None;
+  halt_first = with_halt;
+  step_at = now;
+  reset_at = now;
+}
+
+void Session::Impl::reference() {
+  phase = Phase::Reference;
+  drop_move();
+  halt = Halt::None;
+  home_pending = true;
+  step_at = std::max(now, reference_not_before);
+  reference_until = step_at + options.reference_timeout;
+}
+
+void Session::Impl::reference_failed(const std::string& text) {
+  fail(Failed::Why::ReferenceFailed, text);
+  static constexpr std::array<Duration, 3> kPauses{1s, 10s, 30s};
+  reference_not_before = now + kPauses[std::min<std::size_t>(static_cast<std::size_t>(references_failed), 2)];
+  ++references_failed;
+  recover(true);
+}
+
+void Session::Impl::go_on_from_state() {
+  if ((word & (state::kFaults | state::kHalt | state::kMotion)) != 0) {
+    const bool moving = (word & state::kMotion) != 0;
+    if ((word & state::kFaults) != 0) fail_by_state(Failed::Why::ModuleError);
+    if (phase != Phase::Recover) recover(moving);
+  } else if ((word & state::kHomeOk) == 0) {
+    reference();
+  } else {
+    be_ready();
+  }
+}
+
+void Session::Impl::lost() {
+  const unsigned id = options.module_id;
+  if (bus_off) {
+    fail(Failed::Why::BusOff, bus_off_text());
+  } else if (error_passive) {
+    fail(Failed::Why::BusDown,
+         "CAN controller is error-passive: nobody acknowledges its frames; check the module's 24 V logic supply, the "
+         "cable, its termination and the bit rate");
+  } else if (garbled > 0) {
+    fail(Failed::Why::NoReply, formatted("pivot module %u: %d replies garbled, last: ", id, garbled) + garbled_text +
+                                   "; check cable, shield and termination");
+  } else if (foreign_module != 0) {
+    fail(Failed::Why::NoReply,
+         formatted("pivot module %u does not answer, but module %u does: is pivot.module_id right?", id,
+                   foreign_module));
+  } else {
+    fail(Failed::Why::NoReply,
+         formatted("pivot module %u does not answer: check its 24 V logic supply, the CAN cable, the bit rate and "
+                   "pivot.module_id",
+                   id));
+  }
+  garbled = 0;
+  identify(kProbePause);
+}
+
+void Session::Impl::late_replies(Duration round_trip) {
+  fail(Failed::Why::NoReply,
+       formatted(
+           "pivot module %u answers too late (%.0f ms or more): positions would be wrong; check bus load and adapter",
+           unsigned{options.module_id}, in_ms(round_trip)));
+  identify(kQuiet);
+}
+
+void Session::Impl::on_identity(const Value& value) {
+  const auto number = [&value] { return static_cast<double>(std::get<float>(value.value)); };
+  switch (value.parameter) {
+    case Parameter::Firmware:
+      module.firmware = std::get<std::uint16_t>(value.value);
+      break;
+    case Parameter::SerialNumber:
+      module.serial = std::get<std::uint32_t>(value.value);
+      break;
+    case Parameter::Config:
+      config_word = std::get<std::uint32_t>(value.value);
+      break;
+    case Parameter::PositionMin:
+      module.position_min = Angle::rad(number());
+      break;
+    case Parameter::PositionMax:
+      module.position_max = Angle::rad(number());
+      break;
+    case Parameter::VelocityMax:
+      module.velocity_max_rad_s = number();
+      break;
+    case Parameter::AccelerationMax:
+      module.acceleration_max_rad_s2 = number();
+      break;
+    case Parameter::StateWord:
+      word = std::get<std::uint32_t>(value.value);
+      break;
+    default:
+      break;
+  }
+  if (++identity_index < kIdentity.size()) return;
+  if (std::exchange(repeated, false)) {  // once more, when late answers would have come
+    --identity_index;
+    step_at = now + kQuiet;
+    return;
+  }
+  identity_index = 0;
+  shorts = to_short_state(word);
+  identified = true;
+  if (const std::string problem = module_problem(); !problem.empty()) {
+    fail(Failed::Why::ModuleError, problem);
+    return identify(kQuiet);
+  }
+  if (!std::exchange(seen_before, true))
+    BINPICK_LOG(Info, "pivot", "module %u: firmware %04X, serial %u, %.1f to %.1f deg, at most %.0f deg/s; %s",
+                unsigned{options.module_id}, unsigned{module.firmware}, module.serial, module.position_min.in_deg(),
+                module.position_max.in_deg(), degrees(module.velocity_max_rad_s), state_in_words(word).c_str());
+  watchdog_at = now;
+  if (!options.passive) return go_on_from_state();
+  identity_index = kIdentity.size() - 1;  // the state again and again, and nothing else
+  step_at = now + kStatePollPassive;
+}
+
+std::string Session::Impl::module_problem() const {
+  if ((config_word & config_bit::kLinear) != 0)
+    return "the module is a linear axis, not a pivot: is pivot.module_id right?";
+  if (!(module.position_min < module.position_max) || !(module.velocity_max_rad_s > 0) ||
+      !(module.acceleration_max_rad_s2 > 0))
+    return formatted(
+        "the module's limits make no sense (%.3f to %.3f rad, %.3f rad/s, %.3f rad/s2): set them with the "
+        "vendor's tool",
+        module.position_min.in_rad(), module.position_max.in_rad(), module.velocity_max_rad_s,
+        module.acceleration_max_rad_s2);
+  return {};
+}
+
+void Session::Impl::on_command_done(const Request& request) {
+  if (const auto* plain = std::get_if<Plain>(&request); plain != nullptr && phase == Phase::Recover)
+    step_at = now + (plain->command == Command::Reset ? kResetSettle : Duration{0});
+}
+
+void Session::Impl::on_state_word() {
+  switch (phase) {
+    case Phase::Offline:
+    case Phase::Identify:
+      return;
+    case Phase::Recover:
+      return on_state_recovering();
+    case Phase::Reference:
+      return on_state_referencing();
+    case Phase::Stand:
+    case Phase::Move:
+      return on_state_at_work();
+  }
+}
+
+void Session::Impl::on_state_recovering() {
+  if ((word & state::kMotion) != 0 && (word & state::kFaults) == 0 && (word & state::kHalt) == 0) {
+    step_at = now + kStatePoll;  // still braking
+    halt_first = now >= reset_at + kBrakingMax;
+    if (halt_first) reset_at = now;
+    return;
+  }
+  if ((word & (state::kFaults | state::kHalt)) == 0) return go_on_from_state();
+  if ((word & state::kFaults) != 0) fail_by_state(why_so_far());
+  if (now >= reset_at) {
+    reset_at = now + kResetPeriod;
+    step_at = now + kResetSettle;
+    send(Plain{Command::Reset});
+  }
+}
+
+void Session::Impl::on_state_referencing() {
+  if ((word & state::kFaults) != 0) {
+    if ((word & state::kMotorSupply) == 0) return reference_failed("reference run failed: " + faults_in_words(word));
+    fail_by_state(Failed::Why::PowerFault);
+    return recover(true);
+  }
+  if ((word & state::kHalt) != 0) return home_pending ? recover(false) : reference_failed("reference run was halted");
+  constexpr std::uint32_t kDone = state::kHomeOk | state::kRampEnd;
+  if (!home_pending && (word & kDone) == kDone && (word & state::kMotion) == 0) be_ready();
+}
+}  // namespace binpick::drivers::pivot
