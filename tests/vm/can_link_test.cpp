@@ -1,12 +1,15 @@
-#include <cstdlib>
 #include <cstring>
 #include <gtest/gtest.h>
+#include <iterator>
 #include <linux/can.h>
 #include <linux/can/raw.h>
 #include <net/if.h>
+#include <spawn.h>
+#include <sstream>
 #include <string>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
+#include <sys/wait.h>
 #include <unistd.h>
 #include <vector>
 
@@ -63,7 +66,19 @@ bool run(Loop& loop, const std::vector<CanSocket*>& links, Done done, Duration l
   return done();
 }
 
-void shell(const std::string& command) { ASSERT_EQ(std::system(command.c_str()), 0) << command; }
+/// Runs a program of the virtual machine: "real-ip link set can0 down".
+void shell(const std::string& command) {
+  std::istringstream in{command};
+  std::vector<std::string> words{std::istream_iterator<std::string>{in}, {}};
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+  pid_t pid = 0;
+  ASSERT_EQ(::posix_spawnp(&pid, arguments[0], nullptr, nullptr, arguments.data(), environ), 0) << command;
+  int status = -1;
+  ASSERT_EQ(::waitpid(pid, &status, 0), pid);
+  ASSERT_EQ(status, 0) << command;
+}
 
 TEST(CanSocketOnAKernel, FramesBothWaysThroughExactFilters) {
   Loop loop;
@@ -101,7 +116,8 @@ TEST(CanSocketOnAKernel, FramesCarryTheKernelsReceiveTime) {
   module.to_send = {frame(0x0AC, 1)};
   const TimePoint before = clock_now();
   module.link.flush(before);
-  ::usleep(200'000);  // the frame lies in the kernel meanwhile: its time must be that of its arrival
+  Loop elsewhere;  // the frame lies in the kernel meanwhile: its time must be that of its arrival
+  elsewhere.wait(before + 200ms);
   const TimePoint after = clock_now();
   ASSERT_TRUE(run(loop, {&host.link, &module.link}, [&] { return host.received.size() == 1; }));
   EXPECT_EQ(host.link.counters().kernel_times, 1U);
@@ -175,7 +191,8 @@ TEST(CanSocketOnAKernel, AnInterfaceThatVanishesIsFoundAgain) {
   ASSERT_TRUE(run(loop, {&host.link}, [&] { return host.downs.size() >= 2; }));
   EXPECT_NE(host.downs.back().find("vcan0"), std::string::npos);
   for (const std::string& why : host.downs) std::printf("down: %s\n", why.c_str());
-  shell("real-ip link add dev vcan0 type vcan && real-ip link set vcan0 up");
+  shell("real-ip link add dev vcan0 type vcan");
+  shell("real-ip link set vcan0 up");
   EXPECT_TRUE(run(loop, {&host.link}, [&] { return host.ups == 2; }));
 }
 
@@ -187,7 +204,7 @@ TEST(CanSocketOnAKernel, BusOffIsDownAndARestartIsUp) {
   ASSERT_TRUE(run(loop, {&host.link}, [&] { return host.ups == 1; }));
   const int fd = ::socket(PF_CAN, SOCK_RAW, CAN_RAW);
   ifreq request{};
-  std::strcpy(request.ifr_name, "vcan0");
+  std::memcpy(request.ifr_name, "vcan0", 6);
   ASSERT_EQ(::ioctl(fd, SIOCGIFINDEX, &request), 0);
   sockaddr_can address{};
   address.can_family = AF_CAN;
