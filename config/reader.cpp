@@ -3,6 +3,7 @@
 #include <arpa/inet.h>
 #include <cmath>
 #include <cstdio>
+#include <unordered_map>
 
 #include "base/check.hpp"
 #include "base/overloaded.hpp"
@@ -309,10 +310,16 @@ bool read_value(const Value& value, const KeyFacts& facts, const std::string& na
 
 void set_default(const KeyFacts& facts, const Slot& slot) {
   if (facts.default_value == nullptr) return;
-  const Document document = parse("key table", std::string{"default = "} + facts.default_value + "\n");
-  Findings findings{"key table", document.lines};
-  const bool good = document.usable && !document.root.members.empty() &&
-                    read_value(document.root.members.front().value, facts, facts.name, slot, findings);
+  // Each literal is parsed once; the table's texts are constants, so their addresses tell them apart.
+  thread_local std::unordered_map<const char*, Value> parsed;
+  auto known = parsed.find(facts.default_value);
+  if (known == parsed.end()) {
+    Document document = parse("key table", std::string{"default = "} + facts.default_value + "\n");
+    BINPICK_CHECK(document.usable && document.root.members.size() == 1);
+    known = parsed.emplace(facts.default_value, std::move(document.root.members.front().value)).first;
+  }
+  Findings findings{"key table", {}};
+  const bool good = read_value(known->second, facts, facts.name, slot, findings);
   BINPICK_CHECK(good);
 }
 
