@@ -158,6 +158,7 @@ struct Figures {
       listed_right = 0;
   std::vector<double> t_mm, r_deg, time_ms;
   std::map<std::string, double> stages_ms;
+  std::map<std::string, int> missed;  ///< By what became of them.
   std::array<std::array<int, 2>, 10> by_score{};
 };
 
@@ -236,6 +237,13 @@ class Bench {
     return std::hypot(d.centroid_mm, d.angle_rad * radius_mm_) < 0.1 * base_->diameter_mm();
   }
 
+  /// What became of an object that is not in the list: the reason given, without its numbers.
+  std::string reason_of_miss(const Pose3& truth, const vision::DetectionReport& report) const {
+    for (const vision::Rejection& rejection : report.rejected)
+      if (right(rejection.T_supply_object, truth)) return rejection.reason.substr(0, rejection.reason.find(" ("));
+    return "no hypothesis, or not among the rejections told";
+  }
+
   /// Detects once; returns the index of the object that the first answer is, if it is right.
   std::optional<std::size_t> scene(const std::vector<Pose3>& truth, std::uint64_t seed) {
     emulators::World world{setting_.size_mm};
@@ -275,6 +283,7 @@ class Bench {
       if (visible[k] >= 0.5) {
         ++to_find;
         found += hit.contains(k);
+        if (!hit.contains(k)) ++figures_.missed[reason_of_miss(truth[k], report)];
       }
     figures_.to_find += to_find;
     figures_.found += found;
@@ -331,6 +340,8 @@ class Bench {
         at_share(f.time_ms, 0.5), at_share(f.time_ms, 0.95), at_share(f.time_ms, 1));
     std::printf("  mean ms:");
     for (const auto& [stage, ms] : f.stages_ms) std::printf(" %s %.1f;", stage.c_str(), ms / std::max(1, f.scenes));
+    std::printf("\n  missed:");
+    for (const auto& [reason, n] : f.missed) std::printf(" %s: %d;", reason.c_str(), n);
     std::printf("\n  right share by score:");
     for (std::size_t k = 0; k < f.by_score.size(); ++k) {
       const int n = f.by_score[k][0] + f.by_score[k][1];

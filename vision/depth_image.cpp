@@ -136,19 +136,23 @@ DepthImage DepthImageBuilder::image() const {
     }
 
   // A hole is bridged along the direction whose ends agree best; across a depth jump it stays a hole: nobody knows
-  // on which side it lies.
-  DepthImage filled = measured;
+  // on which side it lies. Twice, as with pixels of half the point spacing a hole between four points has holes beside
+  // it.
   const float step_max_mm = band_mm_;
-  for (int r = 0; r < rows_; ++r)
-    for (int c = 0; c < cols_; ++c) {
-      if (!std::isnan(measured.z_mm(r, c))) continue;
-      std::optional<Bridge> best;
-      for (const auto& [d_row, d_col] : {std::pair{0, 1}, {1, 0}}) {
-        const std::optional<Bridge> candidate = bridge(measured, r, c, d_row, d_col);
-        if (candidate && (!best || candidate->step_mm < best->step_mm)) best = candidate;
+  DepthImage filled = measured;
+  for (int pass = 0; pass < 2; ++pass) {
+    const DepthImage before = filled;
+    for (int r = 0; r < rows_; ++r)
+      for (int c = 0; c < cols_; ++c) {
+        if (!std::isnan(before.z_mm(r, c))) continue;
+        std::optional<Bridge> best;
+        for (const auto& [d_row, d_col] : {std::pair{0, 1}, {1, 0}}) {
+          const std::optional<Bridge> candidate = bridge(before, r, c, d_row, d_col);
+          if (candidate && (!best || candidate->step_mm < best->step_mm)) best = candidate;
+        }
+        if (best && best->step_mm <= step_max_mm) filled.z_mm(r, c) = best->z_mm;
       }
-      if (best && best->step_mm <= step_max_mm) filled.z_mm(r, c) = best->z_mm;
-    }
+  }
   return filled;
 }
 }  // namespace binpick::vision

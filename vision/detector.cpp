@@ -23,6 +23,8 @@ using SteadyClock = std::chrono::steady_clock;
 constexpr std::size_t kSparseBest = 1500;
 constexpr std::size_t kDistinctBest = 240;
 constexpr std::size_t kTurnedBest = 16;
+/// So many poses of one place are enough: a well-seen object must not crowd out the others.
+constexpr std::size_t kCrowdMax = 10;
 constexpr std::size_t kRejectionsMax = 20;
 constexpr double kSparseToleranceDiameters = 0.035;
 /// A rotation of a grid of 10 000 is up to nine degrees off, which moves the lowest point against the highest by so
@@ -179,8 +181,8 @@ class Detecting {
     options.steps = 5;
     options.gate_from_mm = std::max(3 * tolerance, static_cast<float>(0.06 * part_.diameter_mm));
     options.gate_to_mm = std::max(2 * tolerance, static_cast<float>(0.03 * part_.diameter_mm));
-    options.edge_gate_from_px = 6;
-    options.edge_gate_to_px = 3;
+    options.edge_gate_from_px = edge_gate_px(6, 0.08);
+    options.edge_gate_to_px = edge_gate_px(3, 0.03);
     share(options_.threads, hypotheses.size(), deadline_, [&](std::size_t i, int) {
       Hypothesis& h = hypotheses[i];
       const View& view = part_.views[h.view];
@@ -189,19 +191,28 @@ class Detecting {
     });
   }
 
+  /// Edges pull from as far as the pose may be off: pixels, or a share of the part where pixels are small.
+  float edge_gate_px(float pixels, double diameters) const {
+    return std::max(pixels, static_cast<float>(diameters * part_.diameter_mm / scene_.pixel_mm));
+  }
+
   std::vector<Hypothesis> distinct(std::vector<Hypothesis> hypotheses) const {
     std::stable_sort(hypotheses.begin(), hypotheses.end(), stronger);
-    const double same_mm = 0.04 * part_.diameter_mm;
+    const double same_mm = 0.04 * part_.diameter_mm, crowd_mm = 0.15 * part_.diameter_mm;
     std::vector<Hypothesis> kept;
     std::vector<Eigen::Vector3f> centres;
     for (const Hypothesis& h : hypotheses) {
       if (kept.size() >= kDistinctBest || h.evidence <= 0) break;
       const Eigen::Vector3f centre = h.pose.R * centroid_ + h.pose.t;
       bool again = false;
-      for (std::size_t k = 0; k < kept.size() && !again; ++k)
-        again = (centres[k] - centre).norm() < same_mm &&
-                displacement_mm({kept[k].pose, {}}, {h.pose, {}}, part_.symmetry, radius_mm_) < same_mm;
-      if (again) continue;
+      std::size_t near = 0;
+      for (std::size_t k = 0; k < kept.size() && !again; ++k) {
+        const float apart = (centres[k] - centre).norm();
+        near += apart < crowd_mm;
+        again =
+            apart < same_mm && displacement_mm({kept[k].pose, {}}, {h.pose, {}}, part_.symmetry, radius_mm_) < same_mm;
+      }
+      if (again || near >= kCrowdMax) continue;
       kept.push_back(h);
       centres.push_back(centre);
     }
@@ -216,6 +227,7 @@ class Detecting {
     options.steps = 5;
     options.gate_from_mm = std::max(2 * tolerance, static_cast<float>(0.03 * part_.diameter_mm));
     options.gate_to_mm = 2 * tolerance;
+    options.edge_gate_from_px = edge_gate_px(4, 0.04);
     for (int round = 0; round < 2; ++round) {
       rasteriser_.draw(pose.R, pose.t, scene_.pixel_mm, scene_.origin_mm, drawn);
       const ModelPoints points = model_points(scene_, rasteriser_, pose, drawn, 400, 160);
@@ -353,10 +365,14 @@ class Detecting {
         detection.visible_fraction = entry.candidate.test.visible_fraction();
         detection.covariance = covariance_of(entry.candidate.information);
         report_.detections.push_back(detection);
-      } else if (report_.rejected.size() < kRejectionsMax) {
+      } else if (report_.rejected.size() < kRejectionsMax && (reason != entry.reason || !entry.overshadowed)) {
         report_.rejected.push_back({T, entry.score, reason});
       }
     }
+    // Then what lost to a better pose of the same place: many, and they tell little.
+    for (const Selected& entry : selected)
+      if (entry.overshadowed && report_.rejected.size() < kRejectionsMax)
+        report_.rejected.push_back({{entry.candidate.pose.iso()}, entry.score, entry.reason});
     if (options_.detections_max > 0 && report_.detections.size() > static_cast<std::size_t>(options_.detections_max))
       report_.detections.resize(static_cast<std::size_t>(options_.detections_max));
   }

@@ -88,7 +88,7 @@ void find_bend(Scene& scene) {
       int pairs = 0;
       for (const Step& step : kPairs) {
         const float a = scene.z_mm(r + step.row, c + step.col), b = scene.z_mm(r - step.row, c - step.col);
-        if (!(std::abs(a - centre) <= 2 * scene.jump_mm && std::abs(b - centre) <= 2 * scene.jump_mm)) continue;
+        if (!(std::abs(a - centre) <= scene.jump_mm && std::abs(b - centre) <= scene.jump_mm)) continue;
         sum += a + b - 2 * centre;
         ++pairs;
       }

@@ -33,7 +33,7 @@ struct Scene {
   int cols() const { return static_cast<int>(z_mm.cols()); }
   bool inside(int row, int col) const { return row >= 0 && col >= 0 && row < rows() && col < cols(); }
 };
-inline constexpr int kEdgeReachPx = 8;
+inline constexpr int kEdgeReachPx = 16;
 
 /// Values that are not finite, or absurd (over a kilometre), count as not measured.
 Scene prepare_scene(const DepthImage& image, double noise_mm);

@@ -11,7 +11,7 @@ constexpr float kVisibleMin = 0.15F;
 constexpr float kContradictedMax = 0.25F;
 constexpr float kEdgeRatioMin = 0.35F;
 constexpr float kNormalAgreementMin = 0.5F;
-constexpr float kBendAgreementMin = 0.05F;
+constexpr float kBendAgreementMin = 0.0F;
 constexpr double kClaimedMax = 0.5;
 constexpr double kInsideMax = 0.12;
 /// A rival has to speak of mostly the same pixels.
@@ -115,6 +115,7 @@ std::vector<Selected> select(const Scene& scene, const Rasteriser& part, const S
           entry.reason = "stands inside a better one";
       }
       if (claimed > kClaimedMax * explained) entry.reason = "explained by a better one";
+      entry.overshadowed = !entry.reason.empty();
     }
     if (entry.reason.empty()) {
       for (int r = 0; r < drawn.rows; ++r)

@@ -25,8 +25,9 @@ struct SelectOptions {
 
 struct Selected {
   Candidate candidate;
-  double score = 0;    ///< Probability of being right.
-  std::string reason;  ///< Why it is not believed; empty: it is.
+  double score = 0;           ///< Probability of being right.
+  std::string reason;         ///< Why it is not believed; empty: it is.
+  bool overshadowed = false;  ///< The reason is a better one at the same place.
 };
 
 /// Goes through the candidates by evidence: the first stands; what shows the same object again is dropped, what lives

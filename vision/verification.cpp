@@ -44,7 +44,7 @@ float drawn_bend(const Template& drawn, int row, int col, float jump_mm) {
   int pairs = 0;
   for (const Step& s : kPairs) {
     const float a = drawn_at(drawn, row + s.row, col + s.col), b = drawn_at(drawn, row - s.row, col - s.col);
-    if (!(std::abs(a - centre) <= 2 * jump_mm && std::abs(b - centre) <= 2 * jump_mm)) continue;
+    if (!(std::abs(a - centre) <= jump_mm && std::abs(b - centre) <= jump_mm)) continue;
     sum += a + b - 2 * centre;
     ++pairs;
   }
