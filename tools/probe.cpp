@@ -8,6 +8,7 @@
 #include "base/clock.hpp"
 #include "base/overloaded.hpp"
 #include "config/config.hpp"
+#include "drivers/pivot/state_word.hpp"
 #include "tools/commands.hpp"
 #include "tools/device_links.hpp"
 
@@ -98,7 +99,7 @@ int probe(const std::string& cell_path) {
             config->pivot.module_id, ready->module.firmware, ready->module.serial, ready->module.position_min.in_deg(),
             ready->module.position_max.in_deg(), Angle::rad(ready->module.velocity_max_rad_s).in_deg(),
             Angle::rad(ready->module.acceleration_max_rad_s2).in_deg());
-        pivot = text;
+        pivot = std::string(text) + "; " + drivers::pivot::state_in_words(devices.pivot().state_word());
         pivot_good = true;
       } else if (const auto* failed = std::get_if<drivers::pivot::Failed>(&*event)) {
         if (!pivot_good) pivot = failed->text;

@@ -23,9 +23,9 @@ struct Options {
   std::chrono::milliseconds setpoint_horizon{
       200};  ///< While moving, the module knows no target further ahead than this.
   std::chrono::seconds reference_timeout{30};
-  bool passive =
-      false;  ///< Looks and does not touch: identifies and reads the state; no RESET, no reference run, no Ready.
-  bool identify_only = false;  ///< For probing: Ready is said without a reference run, and moves are refused.
+  /// For probing: looks and does not touch. Ready is said when the module is identified, whatever its state; no RESET,
+  /// no reference run, no samples, and moves are refused.
+  bool identify_only = false;
 };
 
 /// What the module says of itself at start; limits are read, never assumed.

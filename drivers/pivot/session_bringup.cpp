@@ -188,7 +188,9 @@ void Session::Impl::on_identity(const Value& value) {
                 unsigned{options.module_id}, unsigned{module.firmware}, module.serial, module.position_min.in_deg(),
                 module.position_max.in_deg(), degrees(module.velocity_max_rad_s), state_in_words(word).c_str());
   watchdog_at = now;
-  if (!options.passive) return go_on_from_state();
+  if (!options.identify_only) return go_on_from_state();
+  if (!std::exchange(told_identity, true) || failed) tell(Ready{module});
+  failed.reset();
   identity_index = kIdentity.size() - 1;  // the state again and again, and nothing else
   step_at = now + kStatePollPassive;
 }

@@ -110,6 +110,7 @@ struct Session::Impl {
   std::uint8_t shorts = 0;
   bool identified = false;   ///< Module and word are of a real module.
   bool seen_before = false;  ///< It was logged.
+  bool told_identity = false;
 
   // When to do what.
   TimePoint step_at{};  ///< Next step of identifying, recovering, referencing or of the halt sequence.

@@ -69,7 +69,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   log::set_threshold(log::Level::Error);
   Input input{{data, size}};
   Options options;
-  options.passive = (input.byte() & 7) == 7;
+  options.identify_only = (input.byte() & 7) == 7;
   Session session{options};
   TimePoint now{std::chrono::hours(1)};
   session.on_link_up(now);

@@ -109,10 +109,10 @@ TEST(PivotSession, ReadsPositionAndStateApartWhereTheFirmwareIsOld) {
   EXPECT_GE(bench.samples.size(), 9U);
 }
 
-TEST(PivotSession, PassiveLooksAndDoesNotTouch) {
+TEST(PivotSession, IdentifyOnlyLooksAndDoesNotTouch) {
   PivotOptions module;
   Options options;
-  options.passive = true;
+  options.identify_only = true;
   Bench bench{module, options};
   bench.run_for(300ms);
   ASSERT_TRUE(bench.session.module());
@@ -121,7 +121,14 @@ TEST(PivotSession, PassiveLooksAndDoesNotTouch) {
   bench.run_for(1s);
   EXPECT_EQ(bench.session.state_word() & state::kMotorSupply, state::kMotorSupply);
   EXPECT_EQ(bench.session.state(), State::Identifying);
-  EXPECT_EQ(bench.count<Ready>(), 0);
+  EXPECT_EQ(bench.count<Ready>(), 1);
+  bench.session.move_to(Angle::deg(10), 0.5, bench.now);
+  bench.module.faults.silent = true;
+  bench.run_for(1s);
+  EXPECT_EQ(bench.count<Failed>(), 1);
+  bench.module.faults.silent = false;
+  bench.run_for(1s);
+  EXPECT_EQ(bench.count<Ready>(), 2);
   for (const CanFrame& frame : bench.sent) EXPECT_EQ(frame.id, 0x0CCU) << "reads alone";
 }
 
