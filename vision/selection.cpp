@@ -66,7 +66,7 @@ double displacement_mm(const Candidate& a, const Candidate& b, const Symmetry& s
 
 double score_of(const Candidate& candidate) {
   const DenseTest& t = candidate.test;
-  const double logit = -4.0 + 4.0 * std::min(1.0F, t.visible_fraction() / 0.6F) - 14.0 * t.contradicted_ratio() +
+  const double logit = -4.0 + 4.0 * std::min(1.0F, t.visible_fraction() / 0.6F) - 22.0 * t.contradicted_ratio() +
                        3.0 * t.edge_ratio() + 3.0 * (t.normal_agreement - 0.5) + 2.0 * t.bend_agreement;
   // A rival that explains as much is as likely; evidence that differs by a few per cent decides.
   const double against_rival = 1 / (1 + std::exp((candidate.rival - 1) / kRivalScale));
