@@ -104,7 +104,7 @@ void expect_settled(const std::string& name, int count, const Vector3d& size) {
 }
 
 TEST(Pile, TrackLinksLieInTheSupply) { expect_settled("track_link", 24, kSupply); }
-TEST(Pile, SteeringWheelsLieInTheSupply) { expect_settled("steering_wheel", 14, kSupply); }
+TEST(Pile, SteeringWheelsLieInTheSupply) { expect_settled("steering_wheel", 9, kSupply); }
 TEST(Pile, GearShaftsLieInTheSupply) { expect_settled("gear_shaft", 20, {500, 400, 300}); }
 TEST(Pile, ContactBridgesLieInTheSupply) { expect_settled("contact_bridge", 20, {180, 180, 60}); }
 
