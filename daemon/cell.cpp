@@ -96,10 +96,7 @@ void Cell::on_detect_result(DetectResult result, TimePoint now) {
   apply(CellInput::DetectionDone, now);
 }
 
-void Cell::reload(std::shared_ptr<const CellData> data, TimePoint now) {
-  edited_ = std::move(data);
-  if (state_ == CellState::Idle) put_in_force(now);
-}
+void Cell::reload(std::shared_ptr<const CellData> data) { edited_ = std::move(data); }
 
 void Cell::reload_refused(const std::vector<std::string>& findings, TimePoint now) {
   for (const auto& finding : findings) BINPICK_LOG(Error, "config", "%s", finding.c_str());

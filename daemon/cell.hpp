@@ -40,7 +40,7 @@ class Cell {
 
   /// New configuration; in force at once when no cycle runs, else after it. What only a restart can change keeps its
   /// old value and is named in the log and by an alarm.
-  void reload(std::shared_ptr<const CellData> data, TimePoint now);
+  void reload(std::shared_ptr<const CellData> data);
   /// A reload was refused: alarm and log, the old configuration stays in force.
   void reload_refused(const std::vector<std::string>& findings, TimePoint now);
   const CellData& data() const { return *data_; }

@@ -133,7 +133,7 @@ int run(const std::string& path) {
     if (auto result = worker.take_result()) cell.on_detect_result(std::move(*result), now);
     if (auto edited = reloader.take(path)) {
       if (*edited) {
-        cell.reload(std::move(**edited), now);
+        cell.reload(std::move(**edited));
       } else {
         cell.reload_refused(edited->error(), now);
       }

@@ -19,7 +19,7 @@ TEST(Reload, AGoodEditIsInForceAtTheNextCycleAndNotInTheRunningOne) {
   ASSERT_TRUE(cell.run_until([&] { return cell.cell().sweep_state() == drivers::sweep::State::Sweeping; }));
   CellFile edited;
   edited.tilt_max_deg = 1;  // nothing lies so straight
-  cell.cell().reload(test_folder().load(edited), cell.now());
+  cell.cell().reload(test_folder().load(edited));
   std::optional<emulators::PlcResult> result;
   ASSERT_TRUE(cell.run_until([&] { return (result = cell.plc.take_result()).has_value(); }));
   EXPECT_EQ(result->code, plc::ResultCode::PickFound) << "the running cycle keeps what it began with";
@@ -46,7 +46,7 @@ TEST(Reload, ABadEditLeavesAnAlarmAndTheOldConfigurationInForce) {
   EXPECT_TRUE(cell.plc.alarms_seen().contains(plc::Alarm::ConfigurationRefused));
   // A good one takes the alarm back.
   ASSERT_TRUE(cell.run_until_ready());
-  cell.cell().reload(test_folder().load({}), cell.now());
+  cell.cell().reload(test_folder().load({}));
   EXPECT_TRUE(cell.run_until([&] { return !cell.plc.alarm_active(); }, 2s));
 }
 
@@ -57,7 +57,8 @@ TEST(Reload, WhatNeedsARestartIsSaidByName) {
   edited.plc_port = 1503;
   std::string log;
   log::set_sink([&](log::Level, std::string_view, std::string_view text) { log.append(text).append("\n"); });
-  cell.cell().reload(test_folder().load(edited), cell.now());
+  cell.cell().reload(test_folder().load(edited));
+  cell.run_for(1ms);
   log::set_sink({});
   EXPECT_NE(log.find("plc.listen"), std::string::npos) << log;
   EXPECT_TRUE(
