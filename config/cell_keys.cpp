@@ -62,8 +62,7 @@ const std::vector<Section<Config>>& cell_sections() {
              .help = "Addresses that may connect, the PLC's first of all. This machine itself always may, any "
                      "other is refused."},
             [](C& c) -> Slot { return &c.plc.allow; }},
-           {{.name = "connections_max", .type = Integer, .min = 1, .max = 64, .default_value = "8",
-             .change = kRestart,
+           {{.name = "connections_max", .type = Integer, .min = 1, .max = 16, .default_value = "8",
              .help = "Connections at the same time; one of them may write."},
             [](C& c) -> Slot { return &c.plc.connections_max; }},
            {{.name = "heartbeat_timeout_ms", .type = Integer, .unit = "ms", .max = 60000, .default_value = "3000",

@@ -26,7 +26,8 @@ std::uint16_t to_u16(double value) { return static_cast<std::uint16_t>(std::clam
 }  // namespace
 
 Cell::Cell(std::shared_ptr<const CellData> data, std::uint16_t boot_count)
-    : data_{std::move(data)},
+    : started_with_{data->config},
+      data_{std::move(data)},
       plc_{with_ids(data_->config), boot_count},
       pivot_{data_->config.pivot},
       scanner_{data_->config.scanner},
@@ -105,7 +106,7 @@ void Cell::reload_refused(const std::vector<std::string>& findings, TimePoint no
 }
 
 void Cell::put_in_force(TimePoint now) {
-  const auto restart = config::needs_restart(data_->config, edited_->config);
+  const auto restart = config::needs_restart(started_with_, edited_->config);
   data_ = std::exchange(edited_, nullptr);
   plc_.reconfigure(with_ids(data_->config), now);
   plc_.clear(plc::Alarm::ConfigurationRefused, now);

@@ -73,6 +73,7 @@ class Cell {
   void on(const drivers::robot::Event& event, TimePoint now);
   void on(drivers::sweep::Event& event, TimePoint now);
 
+  const config::Config started_with_;  // what the sessions and links still run on
   std::shared_ptr<const CellData> data_;
   std::shared_ptr<const CellData> edited_;  // in force after the running cycle
   plc::Session plc_;
