@@ -65,12 +65,12 @@ TEST(Reload, WhatNeedsARestartIsSaidByName) {
       cell.run_until([&] { return cell.plc.alarms_seen().contains(plc::Alarm::ConfigurationNeedsRestart); }, 2s));
   EXPECT_TRUE(cell.plc.ready());
   // A second reload of the same file changes nothing: the port is still the old one, so it still stands.
-  cell.cell().reload(test_folder().load(edited), cell.now());
+  cell.cell().reload(test_folder().load(edited));
   cell.run_for(1s);
   EXPECT_TRUE(cell.plc.alarm_active());
   EXPECT_EQ(cell.plc.alarms(), std::vector{plc::Alarm::ConfigurationNeedsRestart});
   // Back to what it was started with: nothing waits for a restart any more.
-  cell.cell().reload(test_folder().load({}), cell.now());
+  cell.cell().reload(test_folder().load({}));
   EXPECT_TRUE(cell.run_until([&] { return !cell.plc.alarm_active(); }, 2s));
 }
 }  // namespace binpick::support
