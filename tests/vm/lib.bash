@@ -68,7 +68,7 @@ vm_boot() {
   say "booting $kernel_package"
   timeout "$seconds" qemu-system-x86_64 -accel tcg -cpu max -smp 1 -nographic -no-reboot -nodefaults -serial stdio \
     -kernel "$kernel_root/boot/vmlinuz-$version" -initrd "$from.cpio" "$@" \
-    </dev/null 2>&1 | tr -d '\r' | tee "$from.console.txt" || true
+    </dev/null 2>&1 | sed -u 's/\r//g; s/\x1b\[[?0-9;]*[a-zA-Z]//g; s/\x1bc//g' | tee "$from.console.txt" || true
   result=$(sed -n 's/^VM-RESULT //p' "$from.console.txt" | tail -1)
   say "result ${result:-none (the VM did not come to its end)}; VM $((SECONDS - begin)) s, whole run $SECONDS s"
 }
