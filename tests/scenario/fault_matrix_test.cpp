@@ -108,7 +108,7 @@ struct Outcome {
 
 Outcome play(const Case& c, Phase phase) {
   Outcome outcome;
-  EmulatedCell cell{test_folder().load({}), scene_of("track_link", 2, 5), 5};
+  EmulatedCell cell{test_folder().load(coarse_cell()), scene_of("track_link", 2, 5), 5};
   cell.detection_time = 1500ms;  // long enough for a fault in it to be noticed
   if (!cell.run_until_ready() || !reach(cell, phase)) {
     ADD_FAILURE() << "the cell did not come to " << to_text(phase);
@@ -129,6 +129,7 @@ Outcome play(const Case& c, Phase phase) {
       [&] { return cell.cell().plc().state() == plc::State::Ready && cell.plc.ready() && cell.plc.idle(); }, 10s);
   outcome.ready_after_s = in_s(cell.now() - healed);
   cell.detection_time = 150ms;
+  cell.run_for(4s);  // a robot that had a pick to fetch comes, takes it and leaves the view
   const auto result = cell.pick();
   outcome.next_pick = result && result->code == plc::ResultCode::PickFound;
   for (const auto alarm : cell.plc.alarms_seen()) {

@@ -10,6 +10,14 @@
 namespace binpick::support {
 namespace fs = std::filesystem;
 
+CellFile coarse_cell() {
+  CellFile file;
+  file.frequency_hz = 200;
+  file.resolution_deg = 0.4;
+  file.sweep_speed_deg_s = 20;
+  return file;
+}
+
 std::string to_toml(const CellFile& file) {
   std::ostringstream out;
   out << "[cell]\nname = \"test\"\nstate_dir = \"" << file.state_dir << "\"\npicture_dir = \"" << file.picture_dir
@@ -19,8 +27,9 @@ std::string to_toml(const CellFile& file) {
       << "\"\ncan_listen_port = " << file.can_listen_port
       << "\nmodule_id = 12\nT_base_pivot = { xyz_mm = [1200, 0, 1860], rpy_deg = [0, 90, 0] }\n\n"
       << "[scanner]\nmodel = \"lms400\"\naddress = \"127.0.0.1:" << file.scanner_port
-      << "\"\nfrequency_hz = 360\nresolution_deg = 0.25\nstart_deg = 70\nrange_deg = 40\nlatency_ms = "
-      << file.scanner_latency_ms << "\nT_pivot_scanner = { xyz_mm = [60, 0, 0], rpy_deg = [180, -90, 0] }\n\n"
+      << "\"\nfrequency_hz = " << file.frequency_hz << "\nresolution_deg = " << file.resolution_deg
+      << "\nstart_deg = 70\nrange_deg = 40\nlatency_ms = " << file.scanner_latency_ms
+      << "\nT_pivot_scanner = { xyz_mm = [60, 0, 0], rpy_deg = [180, -90, 0] }\n\n"
       << "[robot]\ndialect = \"ur\"\nsilence_max_s = 5\nlisten = \"127.0.0.1:" << file.robot_port
       << "\"\nallow = []\n\n"
       << "[reach]\ntilt_max_deg = " << file.tilt_max_deg << "\n\n[detection]\nthreads = 2\ndeadline_ms = 3000\n\n"

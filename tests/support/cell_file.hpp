@@ -15,6 +15,8 @@ struct CellFile {
   double tilt_max_deg = 45;
   double score_min = 0.5;
   double sweep_speed_deg_s = 25;
+  double frequency_hz = 360;
+  double resolution_deg = 0.25;
   double scanner_latency_ms = 0;
   int detect_timeout_ms = 5000;
   std::string state_dir;
@@ -22,6 +24,10 @@ struct CellFile {
   // Sockets, for tests that use them; in memory nobody looks at them.
   std::uint16_t plc_port = 1502, can_port = 20000, can_listen_port = 0, scanner_port = 2111, robot_port = 5002;
 };
+
+/// A third of the points: for tests that look at the sequence and not at millimetres, and have to keep pace under a
+/// sanitizer.
+CellFile coarse_cell();
 
 std::string to_toml(const CellFile& file);
 

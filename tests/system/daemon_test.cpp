@@ -20,7 +20,7 @@ bool reach_sweep(SystemCell& cell) {
 }  // namespace
 
 TEST(Daemon, MakesAWholePick) {
-  SystemCell cell{{}, scene_of("track_link", 3, 2)};
+  SystemCell cell{coarse_cell(), scene_of("track_link", 3, 2)};
   ASSERT_TRUE(cell.run_until_ready());
   const auto result = cell.pick();
   ASSERT_TRUE(result.has_value());
@@ -29,7 +29,7 @@ TEST(Daemon, MakesAWholePick) {
 }
 
 TEST(Daemon, KilledInASweepThePivotStopsByItselfAndThePlcSeesTheRestart) {
-  SystemCell cell{{}, scene_of("track_link", 3, 2)};
+  SystemCell cell{coarse_cell(), scene_of("track_link", 3, 2)};
   ASSERT_TRUE(cell.run_until_ready());
   const auto boot = cell.plc().boot_count();
   ASSERT_TRUE(reach_sweep(cell));
@@ -51,7 +51,7 @@ TEST(Daemon, KilledInASweepThePivotStopsByItselfAndThePlcSeesTheRestart) {
 TEST(Daemon, TermInEachStateEndsItSafelyWithinTwoSeconds) {
   enum class When { Ready, Sweeping, Detecting, ResultValid };
   for (const When when : {When::Ready, When::Sweeping, When::Detecting, When::ResultValid}) {
-    SystemCell cell{{}, scene_of("track_link", 3, 2)};
+    SystemCell cell{coarse_cell(), scene_of("track_link", 3, 2)};
     ASSERT_TRUE(cell.run_until_ready());
     cell.plc().hold_ack = true;
     if (when == When::Sweeping) {
@@ -73,7 +73,7 @@ TEST(Daemon, TermInEachStateEndsItSafelyWithinTwoSeconds) {
 }
 
 TEST(Daemon, ReloadsWhileCyclesRun) {
-  SystemCell cell{{}, scene_of("track_link", 3, 2)};
+  SystemCell cell{coarse_cell(), scene_of("track_link", 3, 2)};
   ASSERT_TRUE(cell.run_until_ready());
   // A bad edit: alarm, and the old configuration goes on.
   cell.plc().raise_request(1, 1);
@@ -112,7 +112,7 @@ TEST(Daemon, RefusesABadFileAtTheStart) {
 }
 
 TEST(Daemon, OneFaultOfEachDeviceOverSockets) {
-  SystemCell cell{{}, scene_of("track_link", 3, 2)};
+  SystemCell cell{coarse_cell(), scene_of("track_link", 3, 2)};
   ASSERT_TRUE(cell.run_until_ready());
   const auto recovers = [&](const char* what, plc::Alarm alarm) {
     SCOPED_TRACE(what);
