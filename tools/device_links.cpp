@@ -1,5 +1,6 @@
 #include "tools/device_links.hpp"
 
+#include <chrono>
 #include <stdexcept>
 
 namespace binpick::tools {
@@ -17,6 +18,28 @@ link::Endpoint scanner_endpoint(const config::Config& config) {
   return *endpoint;
 }
 }  // namespace
+
+bool daemon_runs(const config::Config& config) {
+  auto endpoint = link::parse_endpoint(config.plc_listen);
+  if (!endpoint) return false;
+  if (endpoint->host.empty() || endpoint->host == "0.0.0.0") endpoint->host = "127.0.0.1";
+  link::Loop loop;
+  bool connected = false;
+  link::TcpClient client{loop,
+                         *endpoint,
+                         {.on_connected = [&](TimePoint) { connected = true; },
+                          .on_bytes = [](ByteView, TimePoint) {},
+                          .on_disconnected = [](TimePoint) {},
+                          .take_output = [] { return Bytes{}; }}};
+  const SystemClock clock;
+  TimePoint now = clock.now();
+  const TimePoint until = now + std::chrono::milliseconds(300);
+  while (!connected && now < until) {
+    client.on_deadline(now);
+    now = loop.wait(earlier(client.deadline(), until));
+  }
+  return connected;
+}
 
 DeviceLinks::DeviceLinks(const config::Config& config, bool may_move)
     : pivot_{pivot_options(config, may_move)},

@@ -13,8 +13,11 @@
 #include "drivers/scanner/lms400/session.hpp"
 
 namespace binpick::tools {
+/// Whether somebody answers at the cell's PLC address: binpickd is at work then, and holds pivot and scanner.
+bool daemon_runs(const config::Config& config);
+
 /// Pivot and scanner of a cell file on their real links, for commands that need the devices and not the daemon. The two
-/// must not run at the same time: the scanner serves one client.
+/// must not run at the same time (ask daemon_runs first): the scanner serves one client, the pivot obeys two masters.
 class DeviceLinks {
  public:
   /// `may_move`: false keeps the pivot from its reference run.

@@ -27,21 +27,11 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   app.set_version_flag("--version", "binpick " BINPICK_VERSION);
   int exit_status = 0;
-#ifdef BINPICK_HAS_CHECK
   tools::add_check(app, exit_status);
-#endif
-#ifdef BINPICK_HAS_PROBE
   tools::add_probe(app, exit_status);
-#endif
-#ifdef BINPICK_HAS_SCAN
   tools::add_scan(app, exit_status);
-#endif
-#ifdef BINPICK_HAS_TRAIN
   tools::add_train(app, exit_status);
-#endif
-#ifdef BINPICK_HAS_DETECT
   tools::add_detect(app, exit_status);
-#endif
   // CLI11 would only say that a subcommand is missing.
   if (argc > 1 && argv[1][0] != '-') {
     std::string names;

@@ -19,28 +19,6 @@ constexpr Duration kAnswerMax = std::chrono::seconds(4);
 constexpr Duration kSpinUpMax = std::chrono::seconds(15);  // the scanner, once it has answered at all
 constexpr Duration kRobotMax = std::chrono::seconds(3);
 
-/// Somebody listens there already; without a daemon, the address is free for us to listen on.
-bool listens(drivers::link::Loop& loop, const std::string& address) {
-  auto endpoint = drivers::link::parse_endpoint(address);
-  if (!endpoint) return false;
-  if (endpoint->host.empty() || endpoint->host == "0.0.0.0") endpoint->host = "127.0.0.1";
-  bool connected = false;
-  drivers::link::TcpClient client{loop,
-                                  *endpoint,
-                                  {.on_connected = [&](TimePoint) { connected = true; },
-                                   .on_bytes = [](ByteView, TimePoint) {},
-                                   .on_disconnected = [](TimePoint) {},
-                                   .take_output = [] { return Bytes{}; }}};
-  const SystemClock clock;
-  TimePoint now = clock.now();
-  const TimePoint until = now + std::chrono::milliseconds(300);
-  while (!connected && now < until) {
-    client.on_deadline(now);
-    now = loop.wait(earlier(client.deadline(), until));
-  }
-  return connected;
-}
-
 /// Waits a while for the robot's program to connect. Its address, or nothing.
 std::optional<std::string> robot_address(drivers::link::Loop& loop, const std::string& listen) {
   const auto endpoint = drivers::link::parse_endpoint(listen);
@@ -68,16 +46,16 @@ std::optional<std::string> robot_address(drivers::link::Loop& loop, const std::s
 int probe(const std::string& cell_path) {
   const auto config = config::load(cell_path);
   if (!config) {
-    std::fprintf(stderr, "binpick: %s has %zu findings; see them with: binpick check %s\n", cell_path.c_str(),
-                 config.error().size(), cell_path.c_str());
+    std::fprintf(stderr, "binpick: %s is not a good cell file; see all findings with: binpick check %s\n",
+                 cell_path.c_str(), cell_path.c_str());
     return 2;
   }
-  DeviceLinks devices{*config, false};
-  if (listens(devices.loop(), config->plc_listen)) {
+  if (daemon_runs(*config)) {
     std::fprintf(stderr, "binpick: binpickd is at work on %s and holds the devices; stop it before probing\n",
                  config->plc_listen.c_str());
     return 1;
   }
+  DeviceLinks devices{*config, false};
 
   std::string pivot = "no answer", scanner;
   bool pivot_good = false, scanner_good = false;
@@ -139,7 +117,7 @@ int probe(const std::string& cell_path) {
 void add_probe(CLI::App& app, int& exit_status) {
   auto cell = std::make_shared<std::string>();
   auto* command = app.add_subcommand("probe", "Reaches each configured device and says what it is; nothing moves.");
-  command->add_option("CELL.toml", *cell, "cell file")->required();
+  command->add_option("CELL.toml", *cell, "the cell file")->required();
   command->callback([cell, &exit_status] { exit_status = probe(*cell); });
 }
 }  // namespace binpick::tools

@@ -10,6 +10,7 @@
 #include "drivers/sweep/sweep.hpp"
 #include "tools/commands.hpp"
 #include "tools/device_links.hpp"
+#include "tools/output.hpp"
 #include "vision/cloud.hpp"
 #include "vision/registration.hpp"
 
@@ -48,8 +49,8 @@ bool bring_up(DeviceLinks& devices, drivers::sweep::Sweep& sweep, Troubles& trou
 int scan(const std::string& cell_path, const std::string& out_path, int supply_id) {
   const auto config = config::load(cell_path);
   if (!config) {
-    std::fprintf(stderr, "binpick: %s has %zu findings; see them with: binpick check %s\n", cell_path.c_str(),
-                 config.error().size(), cell_path.c_str());
+    std::fprintf(stderr, "binpick: %s is not a good cell file; see all findings with: binpick check %s\n",
+                 cell_path.c_str(), cell_path.c_str());
     return 2;
   }
   const config::Supply* supply = nullptr;
@@ -62,6 +63,15 @@ int scan(const std::string& cell_path, const std::string& out_path, int supply_i
     std::fprintf(stderr, "binpick: %s has no supply %d; name one of its [[supply]] ids\n", cell_path.c_str(),
                  supply_id);
     return 2;
+  }
+  if (const auto trouble = cannot_be_written(out_path); !trouble.empty()) {
+    std::fprintf(stderr, "binpick: %s\n", trouble.c_str());
+    return 1;
+  }
+  if (daemon_runs(*config)) {
+    std::fprintf(stderr, "binpick: binpickd is at work on %s and holds the devices; stop it before scanning\n",
+                 config->plc_listen.c_str());
+    return 1;
   }
 
   DeviceLinks devices{*config, true};
@@ -130,8 +140,8 @@ void add_scan(CLI::App& app, int& exit_status) {
   };
   auto arguments = std::make_shared<Arguments>();
   auto* command = app.add_subcommand("scan", "One sweep, saved as a cloud that detect reads. The pivot moves!");
-  command->add_option("CELL.toml", arguments->cell, "cell file")->required();
-  command->add_option("-o,--output", arguments->out, "cloud to write (PLY)")->required();
+  command->add_option("CELL.toml", arguments->cell, "the cell file")->required();
+  command->add_option("-o,--output", arguments->out, "the cloud to write (SCENE.ply)")->required();
   command->add_option("--supply", arguments->supply, "id of the supply; default: the first one");
   command->callback(
       [arguments, &exit_status] { exit_status = scan(arguments->cell, arguments->out, arguments->supply); });
