@@ -32,9 +32,9 @@ void print_summary(const config::Config& cell) {
 }  // namespace
 
 void add_check(CLI::App& app, int& exit_status) {
-  auto* command = app.add_subcommand("check", "Validate a cell file and its part files; all findings at once");
+  auto* command = app.add_subcommand("check", "Validates a cell file and its part files; all findings at once.");
   auto path = std::make_shared<std::string>();
-  command->add_option("cell", *path, "the cell file, CELL.toml")->required();
+  command->add_option("CELL.toml", *path, "the cell file")->required();
   command->callback([path, &exit_status] {
     const auto cell = config::load(*path);
     if (cell) {

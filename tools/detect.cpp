@@ -8,6 +8,7 @@
 
 #include "base/rotation.hpp"
 #include "tools/commands.hpp"
+#include "tools/output.hpp"
 #include "vision/cloud.hpp"
 #include "vision/detector.hpp"
 #include "vision/draw.hpp"
@@ -87,6 +88,9 @@ int run(const DetectArguments& arguments) {
   if (!part) return complain(2, part.error().text);
   const auto points = vision::load_cloud(arguments.scene);
   if (!points) return complain(2, points.error().text);
+  for (const std::string& path : {arguments.image, arguments.json == "-" ? std::string{} : arguments.json})
+    if (const auto trouble = path.empty() ? path : cannot_be_written(path); !trouble.empty())
+      return complain(1, trouble);
 
   vision::DetectorOptions options;
   options.threads = arguments.threads;
@@ -135,18 +139,20 @@ int run(const DetectArguments& arguments) {
 
 void add_detect(CLI::App& app, int& exit_status) {
   auto arguments = std::make_shared<DetectArguments>();
-  CLI::App* command = app.add_subcommand("detect", "detect a trained part in a point cloud");
-  command->add_option("PART.kb", arguments->part, "knowledge base, made by `binpick train`")->required();
-  command->add_option("SCENE.ply", arguments->scene, "point cloud, millimetres, supply frame")->required();
-  command->add_option("--json", arguments->json, "write the whole report here; - is stdout, without the table");
-  command->add_option("--image", arguments->image, "draw the detections over the depth image (PNG)");
+  CLI::App* command = app.add_subcommand("detect", "Finds the objects of a trained part in a point cloud.");
+  command->add_option("PART.kb", arguments->part, "the knowledge base, made by binpick train")->required();
+  command->add_option("SCENE.ply", arguments->scene, "the cloud: PLY, millimetres, in the supply's frame (z up)")
+      ->required();
+  command->add_option("--json", arguments->json,
+                      "write the whole report to this file; -: to stdout, without the table");
+  command->add_option("--image", arguments->image, "write the depth image with the detections drawn over it (PNG)");
   command->add_option("--max", arguments->max, "report at most so many detections (default: all)")
       ->check(CLI::Range(1, 1'000'000));
   command->add_option("--repeat", arguments->repeat, "detect so many times and say how long it took")
       ->check(CLI::Range(1, 100'000));
   command->add_option("--threads", arguments->threads, "threads; the result does not depend on it (default: 2)")
       ->check(CLI::Range(1, 64));
-  command->add_option("--deadline-ms", arguments->deadline_ms, "return the best found after so long")
+  command->add_option("--deadline-ms", arguments->deadline_ms, "answer the best found until then")
       ->check(CLI::Range(1, 3'600'000));
   command->callback([arguments, &exit_status] { exit_status = run(*arguments); });
 }

@@ -1,17 +1,24 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <unistd.h>
 
 #include "config/config.hpp"
 #include "tools/commands.hpp"
+#include "tools/output.hpp"
 #include "vision/knowledge_base.hpp"
 #include "vision/mesh.hpp"
 
 namespace binpick::tools {
 namespace {
+constexpr std::array<std::string_view, 3> kMeshEndings{".stl", ".obj", ".ply"};
+
 struct TrainOrder {
   std::string part;
   std::string output;
@@ -53,11 +60,22 @@ std::string first_of(const std::vector<config::Diagnostic>& findings) {
   return text;
 }
 
+/// A part file names its mesh; a mesh in its place would only give riddles about TOML.
+bool is_mesh(std::string path) {
+  std::transform(path.begin(), path.end(), path.begin(), [](unsigned char c) { return std::tolower(c); });
+  return std::any_of(kMeshEndings.begin(), kMeshEndings.end(),
+                     [&](std::string_view ending) { return path.ends_with(ending); });
+}
+
 int run(const TrainOrder& order) {
+  if (is_mesh(order.part))
+    return failed(2, order.part + ": is a mesh, not a part file; write a PART.toml with mesh = \"" +
+                         std::filesystem::path{order.part}.filename().string() + "\" beside it");
   const auto part = config::load_part(order.part);
   if (!part) return failed(2, part.error().empty() ? order.part + ": cannot be read" : first_of(part.error()));
   const auto mesh = vision::load_mesh(part->mesh_path, part->mesh_unit_mm);
   if (!mesh) return failed(2, mesh.error().text);
+  if (const auto trouble = cannot_be_written(order.output); !trouble.empty()) return failed(1, trouble);
   ProgressBar bar;
   vision::TrainingSummary summary;
   const auto base = vision::train(
@@ -74,11 +92,11 @@ int run(const TrainOrder& order) {
 }  // namespace
 
 void add_train(CLI::App& app, int& exit_status) {
-  auto* command = app.add_subcommand("train", "Build a part's knowledge base from its mesh");
+  auto* command = app.add_subcommand("train", "Builds a part's knowledge base from its mesh.");
   auto order = std::make_shared<TrainOrder>();
-  command->add_option("part", order->part, "the part file, PART.toml")->required();
-  command->add_option("-o,--output", order->output, "the knowledge base to write, PART.kb")->required();
-  command->add_option("--threads", order->threads, "threads to use; 0: one for each core")->check(CLI::Range(0, 64));
+  command->add_option("PART.toml", order->part, "the part file; it names the mesh")->required();
+  command->add_option("-o,--output", order->output, "the knowledge base to write (PART.kb)")->required();
+  command->add_option("--threads", order->threads, "threads; 0: one for each core")->check(CLI::Range(0, 64));
   command->callback([order, &exit_status] { exit_status = run(*order); });
 }
 }  // namespace binpick::tools
