@@ -58,10 +58,11 @@ constexpr std::array kAlarms{
               "Lower detection.deadline_ms or raise the time-out; look for other load on the controller, then reset."},
     AlarmText{Alarm::RobotNotClear, "robot not clear of the view",
               "A pick was asked for, but the control bit robot_clear stayed 0, or fell during the sweep.",
-              "Move the robot out of the scanner's view and set robot_clear before (or soon after) the request."},
+              "Move the robot out of the scanner's view, then reset; the PLC waits for robot_clear before it raises a "
+              "request."},
     AlarmText{Alarm::VisionFailed, "detection failed",
               "The detection stopped with an error of its own; the log has the text.",
-              "Check the knowledge base of this part (`binpick train` again); keep the log for a report."},
+              "Check the knowledge base of this part (`binpick train` again), then reset; keep the log for a report."},
     AlarmText{Alarm::ConfigurationRefused, "configuration refused",
               "An edited cell file has errors; the old configuration is in force.",
               "Run `binpick check` on the file, correct it, reload again."},

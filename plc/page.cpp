@@ -188,17 +188,22 @@ a second), and read words 8 … 81 in every poll. All signals are levels: hold e
    word order, do not fit. Read `ack_sequence` and `boot_count`.
 2. Write the block with `control` = 0 (or 8: `robot_clear`) once. A request that already stands when the cell has just started
    is not carried out (result code 30); it has to be seen 0 first.
-3. Set `robot_clear` (bit 3) whenever the robot is out of the scanner's view, and clear it when it goes in. A request made
-   while it is 0 waits for it, until `plc.scan_timeout_ms` (alarm 502).
-4. Wait for `ready` (status bit 0). While it is 0, `not_ready` says why.
+3. Set `robot_clear` (bit 3) whenever the robot is out of the scanner's view, and clear it before it goes in.
+4. **Wait for the robot, then for `ready`** (status bit 0; while it is 0, `not_ready` says why). `ready` speaks for the cell alone:
+   it is 1 again as soon as a result is acknowledged, while the robot is still on its way. After a result with code 1 the robot
+   has to have gone in (`robot_clear` 0) and come out again (`robot_clear` 1) before the next request is raised. A request that
+   comes earlier waits with `robot_clear` = 0 until `plc.scan_timeout_ms` has passed, and a sweep into which the robot moves
+   (`robot_clear` falls) is broken off: both are a fault with alarm 502.
 5. Choose `sequence`: the last one plus 1 (65535 is followed by 1, never 0), and not equal to `ack_sequence`. Set `part_id`,
    `supply_id`, `result_ack` = 0 and the bit `request` (bit 0), all in the same write.
 6. Wait until `ack` (bit 1) is 1 and `ack_sequence` is your number; then clear `request`.
 7. When `scan_done` (bit 4) is 1, the robot may enter the view.
 8. Wait until `result_valid` (bit 3) is 1 and both `result_sequence` and `result_sequence_tail` are your number. If `fault` (bit 5)
-   rises instead, no result comes: go to "After a fault". If your own time-out passes, go to "Abort".
+   rises instead, no result comes: go to "After a fault". If your own time-out passes (longer than `plc.scan_timeout_ms` and
+   `plc.detect_timeout_ms` together: 25 s fits the defaults), go to "Abort".
 9. Look at `result_code`. 1: take `grasp_x` … `grasp_c` and `approach_x` … `approach_c`, or let the robot fetch the pick of
-   this `pick_id` over its socket. Any other code: the table of result codes says what it means and what to do.
+   this `pick_id` over its socket. Any other code: the table of result codes says what it means and what to do. Whether the
+   robot then succeeded stands in no register: the robot tells its own PLC.
 10. Write `result_ack` = your number. The cell clears the result (`result_valid` = 0) and is `ready` again. Without this the result
     stays; it never expires by itself, and the next request clears it, too.
 
