@@ -42,14 +42,19 @@ struct HeightRange {
   float low = 0, high = 1;
 };
 
-HeightRange height_range(const DepthImage& image) {
+/// Of what lies in the supply: the border, where the walls stand, does not count, nor do the last few pixels at either
+/// end. At least `span_min`, so that the noise of a bare floor stays a flat colour.
+HeightRange height_range(const DepthImage& image, float span_min) {
+  const Eigen::Index rows = image.z_mm.rows(), cols = image.z_mm.cols();
+  const Eigen::Index row_margin = rows / 20, col_margin = cols / 20;
   std::vector<float> z;
-  for (const float value : image.z_mm.reshaped<Eigen::RowMajor>())
-    if (std::isfinite(value)) z.push_back(value);
+  for (Eigen::Index r = row_margin; r < rows - row_margin; ++r)
+    for (Eigen::Index c = col_margin; c < cols - col_margin; ++c)
+      if (std::isfinite(image.z_mm(r, c))) z.push_back(image.z_mm(r, c));
   if (z.empty()) return {};
   std::sort(z.begin(), z.end());
-  const HeightRange range{z[z.size() / 100], z[z.size() - 1 - z.size() / 100]};
-  return range.high - range.low > 1 ? range : HeightRange{range.low, range.low + 1};
+  const HeightRange range{z[z.size() / 100], z[z.size() - 1 - z.size() / 200]};
+  return {range.low, std::max(range.high, range.low + span_min)};
 }
 
 cv::Vec3b height_colour(float share) {
@@ -220,7 +225,7 @@ Expected<void, std::string> draw_report(const std::string& png_path, const Depth
   canvas.rows = static_cast<int>(image.z_mm.rows());
   canvas.pixel_mm = image.pixel_mm;
   canvas.origin_mm = image.origin_mm;
-  const HeightRange range = height_range(image);
+  const HeightRange range = height_range(image, static_cast<float>(part.diameter_mm()) / 4);
   canvas.picture = shaded(image, range, canvas.scale);
 
   const Rasteriser rasteriser{part.mesh()};

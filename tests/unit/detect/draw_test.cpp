@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
 #include <string>
 
 #include "tests/unit/detect/scenes.hpp"
@@ -38,6 +39,23 @@ TEST(Draw, AnEmptyReportAndAnEmptyPicture) {
   EXPECT_FALSE(draw_report(png_path(), blank, scenes::bracket_base(), {}).has_value());
   blank.z_mm.setConstant(5, 5, std::numeric_limits<float>::quiet_NaN());
   EXPECT_TRUE(draw_report(png_path(), blank, scenes::bracket_base(), {}).has_value());
+  std::filesystem::remove(png_path());
+}
+
+TEST(Draw, WallsLeaveTheColoursToTheObjects) {
+  constexpr int kSide = 200;
+  DepthImage image;
+  image.pixel_mm = 2;
+  image.z_mm.setConstant(kSide, kSide, 400);                                     // walls, 3 pixels thick
+  image.z_mm.block(3, 3, kSide - 6, kSide - 6).setConstant(0);                   // floor
+  image.z_mm.block(kSide / 4, kSide / 4, kSide / 2, kSide / 2).setConstant(60);  // an object
+  ASSERT_TRUE(draw_report(png_path(), image, scenes::bracket_base(), {}).has_value());
+  const cv::Mat picture = cv::imread(png_path(), cv::IMREAD_GRAYSCALE);
+  ASSERT_FALSE(picture.empty());
+  const int scale = picture.cols / kSide;
+  const auto gray = [&](int row, int col) { return int{picture.at<unsigned char>(row * scale, col * scale)}; };
+  EXPECT_GT(gray(kSide / 2, kSide / 2), gray(kSide / 8, kSide / 2) + 100);
+  EXPECT_GE(gray(0, kSide / 2), gray(kSide / 2, kSide / 2) - 5);  // higher is not darker
   std::filesystem::remove(png_path());
 }
 
