@@ -101,7 +101,7 @@ void Cell::reload(std::shared_ptr<const CellData> data) { edited_ = std::move(da
 
 void Cell::reload_refused(const std::vector<std::string>& findings, TimePoint now) {
   for (const auto& finding : findings) BINPICK_LOG(Error, "config", "%s", finding.c_str());
-  BINPICK_LOG(Error, "config", "reload refused (%zu findings); the old configuration stays in force", findings.size());
+  BINPICK_LOG(Error, "config", "reload refused, %zu finding(s); the old configuration stays in force", findings.size());
   plc_.raise(plc::Alarm::ConfigurationRefused, now);
 }
 

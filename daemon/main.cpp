@@ -95,7 +95,7 @@ int run(const std::string& path) {
   auto loaded = load_cell(path);
   if (!loaded) {
     for (const auto& finding : loaded.error()) std::fprintf(stderr, "%s\n", finding.c_str());
-    BINPICK_LOG(Error, "config", "%s refused with %zu findings; see them with: binpick check %s", path.c_str(),
+    BINPICK_LOG(Error, "config", "%s refused, %zu finding(s); see them with: binpick check %s", path.c_str(),
                 loaded.error().size(), path.c_str());
     return kExitConfig;
   }
@@ -169,7 +169,7 @@ int run(const std::string& path) {
 
 int main(int argc, char** argv) {
   CLI::App app{"binpickd: the cell controller of a bin-picking cell"};
-  app.set_version_flag("--version", std::string{BINPICK_VERSION});
+  app.set_version_flag("--version", "binpickd " BINPICK_VERSION);
   std::string path;
   bool verbose = false;
   app.add_option("--config", path, "cell file (TOML)")->required();
@@ -177,7 +177,9 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
+    if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
+    std::fprintf(stderr, "binpickd: %s; binpickd --help says what it takes\n", error.what());
+    return 2;
   }
   if (verbose) binpick::log::set_threshold(binpick::log::Level::Debug);
   try {

@@ -78,6 +78,14 @@ void print_table(const vision::DetectionReport& report) {
   std::printf(")\n");
 }
 
+/// A cloud far smaller than the part is in metres, most often; "nothing found" alone would not say so.
+void print_size_doubt(const vision::DepthWindow& window, double diameter_mm) {
+  const Eigen::Vector2d size_mm = window.max_mm - window.min_mm;
+  if (size_mm.maxCoeff() < diameter_mm / 4)
+    std::printf("the cloud measures %.3g x %.3g mm, the part %.0f mm: is the cloud in millimetres?\n", size_mm.x(),
+                size_mm.y(), diameter_mm);
+}
+
 int complain(int status, const std::string& text) {
   std::fprintf(stderr, "binpick detect: %s\n", text.c_str());
   return status;
@@ -128,6 +136,7 @@ int run(const DetectArguments& arguments) {
       return complain(1, arguments.json + ": cannot be written; check that the folder exists and has room");
   }
   print_table(report);
+  if (report.detections.empty()) print_size_doubt(vision::window_of(*points), part->diameter_mm());
   if (arguments.repeat > 1) {
     std::sort(times_ms.begin(), times_ms.end());
     std::printf("%d runs: median %.1f ms, best %.1f ms, worst %.1f ms\n", arguments.repeat,

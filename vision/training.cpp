@@ -1,8 +1,10 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <thread>
 
 #include "vision/knowledge_base_impl.hpp"
@@ -121,18 +123,23 @@ Expected<KnowledgeBase, MeshError> train(const Mesh& mesh, const PartOptions& op
   const auto failed = [&](const std::string& why) {
     return unexpected(MeshError{"part " + options.name + ": " + why});
   };
+  const auto mm = [](double value) {
+    std::array<char, 32> text{};
+    std::snprintf(text.data(), text.size(), "%.6g mm", value);
+    return std::string{text.data()};
+  };
   if (mesh.triangles.empty()) return failed("the mesh holds no triangle; export the part as a surface mesh");
   auto part = std::make_shared<KnowledgeBase::Impl>(resolved(mesh, options));
   if (!(part->diameter_mm > 0)) return failed("the mesh has no extent; check mesh_unit");
   if (part->diameter_mm > kLargestPartMm)
-    return failed("the part's diameter is " + std::to_string(part->diameter_mm) + " mm, over " +
-                  std::to_string(kLargestPartMm) + " mm; check mesh_unit");
+    return failed("the part's diameter is " + mm(part->diameter_mm) + ", over " + mm(kLargestPartMm) +
+                  "; check mesh_unit");
   if (!(part->pixel_mm > 0) || part->diameter_mm / part->pixel_mm > 1000)
-    return failed("a pixel of " + std::to_string(part->pixel_mm) + " mm is too small for a part of " +
-                  std::to_string(part->diameter_mm) + " mm; check mesh_unit and pixel_mm");
+    return failed("a pixel of " + mm(part->pixel_mm) + " is too small for a part of " + mm(part->diameter_mm) +
+                  "; check mesh_unit and pixel_mm");
   if (part->diameter_mm < 4 * part->pixel_mm)
-    return failed("the part's diameter is " + std::to_string(part->diameter_mm) + " mm, too small for pixels of " +
-                  std::to_string(part->pixel_mm) + " mm; check mesh_unit, pixel_mm and scanner");
+    return failed("the part's diameter is " + mm(part->diameter_mm) + ", too small for pixels of " +
+                  mm(part->pixel_mm) + "; check mesh_unit, pixel_mm and scanner");
   const int asked = options.rotations.value_or(part->scanner == ScannerClass::Lms400 ? 10'000 : 20'000);
   const auto rotations = training_rotations(std::clamp(asked, 1, kRotationsMax), part->symmetry);
   if (threads <= 0) threads = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 64);

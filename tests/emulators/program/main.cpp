@@ -130,7 +130,8 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : kExitUsage;
+    if (error.get_exit_code() == 0) return app.exit(error);  // --help
+    return complain(std::string{error.what()} + "; binpick-emulator --help says what it takes");
   }
   run.requests = !by_hand;
   if (parts->parsed()) return write_parts(arguments.parts_folder);
@@ -139,7 +140,8 @@ int main(int argc, char** argv) {
     for (const Device which : {Device::Plc, Device::Pivot, Device::Scanner, Device::Robot})
       if (std::ranges::find(arguments.without, to_string(which)) != arguments.without.end()) run.devices.erase(which);
   }
-  if (arguments.config.empty()) return complain("--config CELL.toml is missing");
+  if (arguments.config.empty())
+    return complain("--config CELL.toml is missing; it says where the devices are to be found");
   return play(arguments);
 }
 }  // namespace

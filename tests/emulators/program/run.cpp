@@ -320,9 +320,13 @@ void Run::obey(const FaultCommand& command) {
 }
 
 void Run::obey(Order::Kind order, TimePoint now) {
+  const auto played = [&](bool here, Device device) {
+    if (!here) say("? the %s is not played here", std::string(to_string(device)).c_str());
+    return here;
+  };
   switch (order) {
     case Order::Kind::Pick:
-      pick_wanted_ = true;
+      if (played(plc_ != nullptr, Device::Plc)) pick_wanted_ = true;
       break;
     case Order::Kind::Take:
       say(bin_.take_highest() ? "bin: the highest object is gone, %zu left" : "bin: nothing to take, %zu left",
@@ -332,19 +336,20 @@ void Run::obey(Order::Kind order, TimePoint now) {
       bin_.start_refill();
       break;
     case Order::Kind::RobotRestart:
-      if (robot_) robot_->device.restart_program(now);
+      if (played(robot_ != nullptr, Device::Robot)) robot_->device.restart_program(now);
       break;
     case Order::Kind::PlcRestart:
-      if (plc_) plc_->device.restart();
+      if (played(plc_ != nullptr, Device::Plc)) plc_->device.restart();
       break;
     case Order::Kind::PlcAbort:
-      if (plc_) plc_->device.raise_abort();
+      if (played(plc_ != nullptr, Device::Plc)) plc_->device.raise_abort();
       break;
     case Order::Kind::PlcReset:
-      if (plc_) plc_->device.raise_reset();
+      if (played(plc_ != nullptr, Device::Plc)) plc_->device.raise_reset();
       break;
     case Order::Kind::PivotPowerCycle:
-      if (pivot_) pivot_->with([&](Pivot& pivot) { pivot.power_cycle(now); }), pivot_->wake();
+      if (played(pivot_ != nullptr, Device::Pivot))
+        pivot_->with([&](Pivot& pivot) { pivot.power_cycle(now); }), pivot_->wake();
       break;
     case Order::Kind::Status:
       say("%s", summary().c_str());
