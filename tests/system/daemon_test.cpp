@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <fstream>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -100,7 +101,9 @@ TEST(Daemon, ReloadsWhileCyclesRun) {
   result = cell.pick();
   ASSERT_TRUE(result.has_value());
   EXPECT_EQ(result->code, plc::ResultCode::NotReachable);
-  EXPECT_FALSE(cell.plc().alarm_active());
+  // Its own alarm only: a busy machine may have raised the one of lost profiles.
+  const auto alarms = cell.plc().alarms();
+  EXPECT_EQ(std::ranges::count(alarms, plc::Alarm::ConfigurationRefused), 0);
 }
 
 TEST(Daemon, RefusesABadFileAtTheStart) {
