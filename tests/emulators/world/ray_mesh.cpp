@@ -7,16 +7,20 @@
 
 namespace binpick::emulators {
 namespace {
+using Eigen::Array4f;
 using Eigen::Vector3f;
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr std::uint32_t kLeafTriangles = 4;
 constexpr std::size_t kDepthMax = 64;
 
 /// Distance at which the ray enters the box, or infinity.
-float entry(const Vector3f& low, const Vector3f& high, const Vector3f& origin, const Vector3f& inverse, float limit) {
-  const Vector3f a = (low - origin).cwiseProduct(inverse), b = (high - origin).cwiseProduct(inverse);
-  const float near = std::max(a.cwiseMin(b).maxCoeff(), 0.F), far = std::min(a.cwiseMax(b).minCoeff(), limit);
-  return near <= far ? near : std::numeric_limits<float>::infinity();
+float entry(const Array4f& low, const Array4f& high, const Array4f& origin, const Array4f& inverse, float limit) {
+  const Array4f a = (low - origin) * inverse, b = (high - origin) * inverse;
+  const float near = std::max(a.min(b).maxCoeff(), 0.F), far = std::min(a.max(b).minCoeff(), limit);
+  return near <= far ? near : kInfinity;
 }
+
+Array4f widened(const Vector3f& v, float fourth) { return {v.x(), v.y(), v.z(), fourth}; }
 }  // namespace
 
 RayMesh::RayMesh(const vision::Mesh& mesh) {
@@ -46,8 +50,8 @@ RayMesh::RayMesh(const vision::Mesh& mesh) {
       centres.extend(items[i].centre);
     }
     Node& node = nodes_[range.node];
-    node.low = box.min();
-    node.high = box.max();
+    node.low = widened(box.min(), -kInfinity);
+    node.high = widened(box.max(), kInfinity);
     if (range.end - range.begin <= kLeafTriangles) {
       node.first = range.begin;
       node.count = range.end - range.begin;
@@ -76,8 +80,7 @@ RayMesh::RayMesh(const vision::Mesh& mesh) {
 
 std::optional<RayMesh::Hit> RayMesh::cast(const Vector3f& origin, const Vector3f& direction, float limit_mm) const {
   // A component of zero gives infinity, which the box test takes rightly.
-  const Vector3f inverse = direction.cwiseInverse();
-  constexpr float infinity = std::numeric_limits<float>::infinity();
+  const Array4f inverse = widened(direction.cwiseInverse(), 1), from = widened(origin, 0);
   std::optional<Hit> best;
   float limit = limit_mm;
   struct Entry {
@@ -86,7 +89,7 @@ std::optional<RayMesh::Hit> RayMesh::cast(const Vector3f& origin, const Vector3f
   };
   std::array<Entry, kDepthMax> stack;
   std::size_t height = 0;
-  if (const float d = entry(nodes_[0].low, nodes_[0].high, origin, inverse, limit); d < infinity)
+  if (const float d = entry(nodes_[0].low, nodes_[0].high, from, inverse, limit); d < kInfinity)
     stack[height++] = {0, d};
   while (height > 0) {
     const Entry top = stack[--height];
@@ -94,11 +97,11 @@ std::optional<RayMesh::Hit> RayMesh::cast(const Vector3f& origin, const Vector3f
     const Node& node = nodes_[top.node];
     if (node.count == 0) {
       const Node &left = nodes_[node.first], &right = nodes_[node.first + 1];
-      Entry a{node.first, entry(left.low, left.high, origin, inverse, limit)};
-      Entry b{node.first + 1, entry(right.low, right.high, origin, inverse, limit)};
+      Entry a{node.first, entry(left.low, left.high, from, inverse, limit)};
+      Entry b{node.first + 1, entry(right.low, right.high, from, inverse, limit)};
       if (a.distance < b.distance) std::swap(a, b);  // the nearer one last: it is taken first
-      if (a.distance < infinity) stack[height++] = a;
-      if (b.distance < infinity) stack[height++] = b;
+      if (a.distance < kInfinity) stack[height++] = a;
+      if (b.distance < kInfinity) stack[height++] = b;
       continue;
     }
     for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {

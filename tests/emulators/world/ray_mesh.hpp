@@ -29,9 +29,8 @@ class RayMesh {
   };
   /// A leaf holds `count` triangles from `first` on; an inner node (count 0) has its children at `first` and the next.
   struct Node {
-    Eigen::Vector3f low;
+    Eigen::Array4f low, high;  // x, y, z and a fourth axis without an end, so that one register holds a corner
     std::uint32_t first = 0;
-    Eigen::Vector3f high;
     std::uint32_t count = 0;
   };
   std::vector<Triangle> triangles_;

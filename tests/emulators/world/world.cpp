@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "tests/emulators/world/shapes.hpp"
 
@@ -36,9 +37,13 @@ vision::Mesh surroundings(const Vector3d& size) {
   return mesh;
 }
 
-bool meets(const Eigen::AlignedBox3f& box, const Vector3f& origin, const Vector3f& inverse, float limit) {
+/// Distance at which the ray enters the box; nothing when it misses it or enters beyond `limit`.
+std::optional<float> entry(const Eigen::AlignedBox3f& box, const Vector3f& origin, const Vector3f& inverse,
+                           float limit) {
   const Vector3f a = (box.min() - origin).cwiseProduct(inverse), b = (box.max() - origin).cwiseProduct(inverse);
-  return std::max(a.cwiseMin(b).maxCoeff(), 0.F) <= std::min(a.cwiseMax(b).minCoeff(), limit);
+  const float near = std::max(a.cwiseMin(b).maxCoeff(), 0.F);
+  if (near > std::min(a.cwiseMax(b).minCoeff(), limit)) return std::nullopt;
+  return near;
 }
 }  // namespace
 
@@ -79,16 +84,22 @@ std::optional<World::Hit> World::cast(const Vector3d& origin_mm, const Vector3d&
     const Vector3d normal = surroundings_.mesh->normal(hit->triangle).cast<double>();
     best = Hit{limit, 0, std::abs(normal.dot(direction)), surroundings_.reflectance};
   }
-  for (const Object& object : objects_) {
-    if (!meets(object.box, origin, inverse, limit)) continue;
-    const Eigen::Isometry3d& iso = object.T_supply_object.iso;
+  // Nearest box first: what is hit there hides most of the others.
+  thread_local std::vector<std::pair<float, const Object*>> met;
+  met.clear();
+  for (const Object& object : objects_)
+    if (const auto distance = entry(object.box, origin, inverse, limit)) met.emplace_back(*distance, &object);
+  std::ranges::sort(met, {}, &std::pair<float, const Object*>::first);
+  for (const auto& [distance, object] : met) {
+    if (distance > limit) break;
+    const Eigen::Isometry3d& iso = object->T_supply_object.iso;
     const Vector3d own_direction = iso.linear().transpose() * direction;
     const Vector3d own_origin = iso.linear().transpose() * (origin_mm - iso.translation());
-    const auto hit = object.mesh->cast(own_origin.cast<float>(), own_direction.cast<float>(), limit);
+    const auto hit = object->mesh->cast(own_origin.cast<float>(), own_direction.cast<float>(), limit);
     if (!hit) continue;
     limit = hit->distance_mm;
-    best = Hit{limit, object.id, std::abs(object.mesh->normal(hit->triangle).cast<double>().dot(own_direction)),
-               object.reflectance};
+    best = Hit{limit, object->id, std::abs(object->mesh->normal(hit->triangle).cast<double>().dot(own_direction)),
+               object->reflectance};
   }
   return best;
 }
