@@ -142,7 +142,7 @@ void Cell::update_ready(TimePoint now) {
     reasons |= static_cast<unsigned>(NotReady::Pivot);
   if (scanner != drivers::lms400::Session::State::Idle && scanner != drivers::lms400::Session::State::Measuring)
     reasons |= static_cast<unsigned>(NotReady::Scanner);
-  if (!data_->config.robot_listen.empty() && !robot_.connected()) reasons |= static_cast<unsigned>(NotReady::Robot);
+  if (!started_with_.robot_listen.empty() && !robot_.connected()) reasons |= static_cast<unsigned>(NotReady::Robot);
   if (stopping_) reasons |= static_cast<unsigned>(NotReady::Stopping);
   plc_.set_not_ready(static_cast<std::uint16_t>(reasons), now);
 }

@@ -104,7 +104,7 @@ void Cell::on(const drivers::pivot::Event& event, TimePoint now) {
   if (const auto* ready = std::get_if<drivers::pivot::Ready>(&event)) {
     module_ = ready->module;
     BINPICK_LOG(Notice, "pivot", "ready: module %u, firmware %04x, serial %u, %.1f … %.1f deg, %.1f deg/s at most",
-                data_->config.pivot.module_id, module_->firmware, module_->serial, module_->position_min.in_deg(),
+                started_with_.pivot.module_id, module_->firmware, module_->serial, module_->position_min.in_deg(),
                 module_->position_max.in_deg(), Angle::rad(module_->velocity_max_rad_s).in_deg());
     alarm_off(pivot_alarm_, now);
   }

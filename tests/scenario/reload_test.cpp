@@ -73,4 +73,17 @@ TEST(Reload, WhatNeedsARestartIsSaidByName) {
   cell.cell().reload(test_folder().load({}));
   EXPECT_TRUE(cell.run_until([&] { return !cell.plc.alarm_active(); }, 2s));
 }
+
+TEST(Reload, ARobotsSocketThatOnlyARestartOpensIsNotWaitedFor) {
+  CellFile file = coarse_cell();
+  file.robot_port = 0;  // none: the PLC forwards the movement
+  EmulatedCell cell{test_folder().load(file), empty_scene()};
+  cell.robot.faults.unplugged = true;
+  ASSERT_TRUE(cell.run_until_ready());
+  file.robot_port = 5002;
+  cell.cell().reload(test_folder().load(file));
+  cell.run_for(1s);
+  EXPECT_TRUE(cell.plc.alarms_seen().contains(plc::Alarm::ConfigurationNeedsRestart));
+  EXPECT_TRUE(cell.plc.ready()) << "not_ready " << cell.plc.not_ready();
+}
 }  // namespace binpick::support

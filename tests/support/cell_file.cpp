@@ -30,8 +30,8 @@ std::string to_toml(const CellFile& file) {
       << "\"\nfrequency_hz = " << file.frequency_hz << "\nresolution_deg = " << file.resolution_deg
       << "\nstart_deg = 70\nrange_deg = 40\nlatency_ms = " << file.scanner_latency_ms
       << "\nT_pivot_scanner = { xyz_mm = [60, 0, 0], rpy_deg = [180, -90, 0] }\n\n"
-      << "[robot]\ndialect = \"ur\"\nsilence_max_s = 5\nlisten = \"127.0.0.1:" << file.robot_port
-      << "\"\nallow = []\n\n"
+      << "[robot]\ndialect = \"ur\"\nsilence_max_s = 5\nlisten = \""
+      << (file.robot_port == 0 ? "" : "127.0.0.1:" + std::to_string(file.robot_port)) << "\"\nallow = []\n\n"
       << "[reach]\ntilt_max_deg = " << file.tilt_max_deg << "\n\n[detection]\nthreads = 2\ndeadline_ms = 3000\n\n"
       << "[[supply]]\nid = 1\nname = \"lattice box\"\nsize_mm = [1000, 800, 500]\n"
       << "T_base_supply = { xyz_mm = [1200, 0, 0], rpy_deg = [0, 0, 0] }\nsweep_start_deg = -15\nsweep_end_deg = 15\n"

@@ -22,7 +22,8 @@ struct CellFile {
   std::string state_dir;
   std::string picture_dir;
   // Sockets, for tests that use them; in memory nobody looks at them.
-  std::uint16_t plc_port = 1502, can_port = 20000, can_listen_port = 0, scanner_port = 2111, robot_port = 5002;
+  std::uint16_t plc_port = 1502, can_port = 20000, can_listen_port = 0, scanner_port = 2111;
+  std::uint16_t robot_port = 5002;  ///< 0: no robot connects.
 };
 
 /// A third of the points: for tests that look at the sequence and not at millimetres, and have to keep pace under a
