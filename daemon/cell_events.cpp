@@ -77,6 +77,7 @@ void Cell::on(const plc::Event& event, TimePoint now) {
                                static_cast<unsigned long long>(cycle_id_));
                    apply(CellInput::Cancelled, now);
                  },
+                 [&](const plc::AnswerWithdrawn&) { robot_.withdraw(drivers::robot::NoPick::NotReady); },
                  [&](const plc::CycleTimedOut&) {
                    BINPICK_LOG(Warning, "cell", "cycle %llu took too long and is given up",
                                static_cast<unsigned long long>(cycle_id_));

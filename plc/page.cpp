@@ -225,7 +225,8 @@ A request that was refused with 20, 21 or 31 did not use up its number.
 ### Abort
 
 Set `abort` (bit 1), hold it until `abort_ack` (bit 6), clear it. The running cycle is stopped and forgotten, the result cleared. It
-works in every state. The same number asked again is answered with code 32.
+works in every state. The same number asked again is answered with code 32. A pick that was answered and not yet fetched is taken
+back from the robot's socket too.
 
 ### After a fault
 

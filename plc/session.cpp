@@ -310,6 +310,7 @@ void Session::Impl::apply(Signal signal, TimePoint now) {
       break;
     case Effect::ClearResult:
       if (signal == Signal::ResultAcked) events.emplace_back(ResultAcknowledged{*shown_sequence});
+      if (signal == Signal::AbortRaised) events.emplace_back(AnswerWithdrawn{});
       clear_result();
       break;
     case Effect::StopAndClear:

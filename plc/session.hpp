@@ -83,10 +83,11 @@ enum class NotReady : std::uint16_t {
 
 struct RequestAccepted {
   PickRequest request;
-};                        ///< Start a cycle for it.
-struct CycleAborted {};   ///< Abort by the PLC: stop what moves, forget the cycle.
-struct CycleTimedOut {};  ///< The handshake's own deadline passed: same, and a fault stands.
-struct ResetRaised {};    ///< The PLC wants to go on after a fault: try the devices again.
+};                          ///< Start a cycle for it.
+struct CycleAborted {};     ///< Abort by the PLC: stop what moves, forget the cycle.
+struct AnswerWithdrawn {};  ///< Abort by the PLC, no cycle running: what was answered last is not wanted any more.
+struct CycleTimedOut {};    ///< The handshake's own deadline passed: same, and a fault stands.
+struct ResetRaised {};      ///< The PLC wants to go on after a fault: try the devices again.
 struct ResultAcknowledged {
   std::uint16_t sequence;
 };
@@ -95,8 +96,8 @@ struct RobotClearChanged {
 };
 struct PlcLost {};  ///< No connection, or its heartbeat stopped.
 struct PlcBack {};
-using Event = std::variant<RequestAccepted, CycleAborted, CycleTimedOut, ResetRaised, ResultAcknowledged,
-                           RobotClearChanged, PlcLost, PlcBack>;
+using Event = std::variant<RequestAccepted, CycleAborted, AnswerWithdrawn, CycleTimedOut, ResetRaised,
+                           ResultAcknowledged, RobotClearChanged, PlcLost, PlcBack>;
 
 /// Everything the PLC can see or say. Pure but for a private socket pair through which libmodbus answers.
 class Session {
