@@ -65,13 +65,20 @@ void Cell::watch_robot_lines(TimePoint now) {
   }
 }
 
-bool Cell::drain(TimePoint now) {
+/// The PLC's handshake is ahead of us until its events are heard: what a device or the detection says for a cycle that
+/// the PLC has aborted would count for its next one. So the PLC is always heard first.
+bool Cell::hear_plc(TimePoint now) {
   bool any = false;
+  while (auto event = plc_.take_event()) on(*event, now), any = true;
+  return any;
+}
+
+bool Cell::drain(TimePoint now) {
+  bool any = hear_plc(now);
   while (auto event = pivot_.take_event()) on(*event, now), any = true;
   while (auto event = scanner_.take_event()) on(*event, now), any = true;
   while (auto event = sweep_.take_event()) on(*event, now), any = true;
   while (auto event = robot_.take_event()) on(*event, now), any = true;
-  while (auto event = plc_.take_event()) on(*event, now), any = true;
   return any;
 }
 
@@ -83,6 +90,7 @@ std::optional<TimePoint> Cell::deadline() const {
 std::optional<DetectRequest> Cell::take_detect_request() { return std::exchange(detect_request_, std::nullopt); }
 
 void Cell::on_detect_result(DetectResult result, TimePoint now) {
+  hear_plc(now);
   if (result.cycle_id != cycle_id_ || state_ != CellState::Detecting) {
     BINPICK_LOG(Info, "cell", "late detection of cycle %llu dropped", static_cast<unsigned long long>(result.cycle_id));
     return;

@@ -55,6 +55,7 @@ class Cell {
   std::uint64_t cycles() const { return cycle_id_; }
 
  private:
+  bool hear_plc(TimePoint now);
   bool drain(TimePoint now);
   void apply(CellInput input, TimePoint now);
   void begin_sweep(TimePoint now);

@@ -51,6 +51,7 @@ plc::Alarm alarm_of(const drivers::lms400::Failed& failed) {
 void Cell::on(const plc::Event& event, TimePoint now) {
   std::visit(Overloaded{
                  [&](const plc::RequestAccepted& accepted) {
+                   if (stopping_) return;  // accepted in the turn of the loop that brought the stop
                    const auto& config = data_->config;
                    request_ = accepted.request;
                    const auto recipe = std::ranges::find(config.recipes, request_.part_id, &config::Recipe::id);

@@ -2,6 +2,7 @@
 #include <fstream>
 #include <gtest/gtest.h>
 
+#include "plc/registers.hpp"
 #include "tests/support/cell_file.hpp"
 #include "tests/support/emulated_cell.hpp"
 #include "tests/support/scenes.hpp"
@@ -15,6 +16,8 @@ CellFile with(const std::string& word_order) {
   file.word_order = word_order;
   return file;
 }
+
+constexpr std::uint16_t kClear = plc::control::kRobotClear;
 
 struct WholePick : testing::TestWithParam<const char*> {};
 }  // namespace
@@ -130,6 +133,48 @@ TEST(Cycle, AbortInEachStateStopsThePivotAndLeavesNothingValid) {
     ASSERT_TRUE(result.has_value());
     EXPECT_EQ(result->code, plc::ResultCode::PickFound);
   }
+}
+
+TEST(Cycle, AnAbortThatComesWithTheDetectionsResultLeavesNoPickForTheRobot) {
+  EmulatedCell cell{test_folder().load(coarse_cell()), scene_of("track_link", 2, 3)};
+  ASSERT_TRUE(cell.run_until_ready());
+  cell.plc.raise_request(1, 1);
+  ASSERT_TRUE(cell.run_until([&] { return cell.cell().state() == daemon::CellState::Detecting; }));
+  cell.plc_writes(plc::at("control"), plc::control::kAbort | kClear);
+  cell.cell().on_detect_result(cell.results().back(), cell.now());
+  cell.run_for(5s);
+  EXPECT_EQ(cell.cell().state(), daemon::CellState::Idle);
+  EXPECT_EQ(cell.robot.picks_done(), 0U);
+}
+
+TEST(Cycle, TheResultOfAnAbortedRequestIsNotTheAnswerToTheNextOne) {
+  EmulatedCell cell{test_folder().load(coarse_cell()), scene_of("track_link", 2, 3)};
+  ASSERT_TRUE(cell.run_until_ready());
+  cell.plc.raise_request(1, 1);
+  ASSERT_TRUE(cell.run_until([&] { return cell.cell().state() == daemon::CellState::Detecting; }));
+  cell.plc_writes(plc::at("control"), plc::control::kAbort | kClear);
+  cell.plc_writes(plc::at("control"), kClear);
+  cell.plc_writes(plc::at("sequence"), 99);
+  cell.plc_writes(plc::at("control"), plc::control::kRequest | kClear);
+  cell.cell().on_detect_result(cell.results().back(), cell.now());
+  cell.cell().run(cell.now());
+  EXPECT_EQ(cell.cell().plc().state(), plc::State::Scanning);
+  EXPECT_EQ(cell.cell().state(), daemon::CellState::Sweeping);
+}
+
+TEST(Cycle, AnAbortAfterTheResultTakesThePickFromTheRobotToo) {
+  EmulatedCell cell{test_folder().load(coarse_cell()), scene_of("track_link", 2, 3)};
+  ASSERT_TRUE(cell.run_until_ready());
+  cell.plc.hold_ack = true;
+  cell.plc.raise_request(1, 1);
+  ASSERT_TRUE(cell.run_until([&] { return cell.cell().state() == daemon::CellState::Detecting; }));
+  cell.robot.faults.unplugged = true;
+  ASSERT_TRUE(cell.run_until([&] { return cell.plc.result_valid(); }));
+  cell.plc.raise_abort();
+  ASSERT_TRUE(cell.run_until([&] { return !cell.plc.result_valid(); }, 1s));
+  cell.robot.faults.unplugged = false;
+  cell.run_for(5s);
+  EXPECT_EQ(cell.robot.picks_done(), 0U);
 }
 
 TEST(Cycle, AHungVisionWorkerIsATimeOutAndItsLateResultIsDropped) {

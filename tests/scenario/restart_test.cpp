@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "plc/registers.hpp"
 #include "tests/support/cell_file.hpp"
 #include "tests/support/emulated_cell.hpp"
 #include "tests/support/scenes.hpp"
@@ -66,5 +67,19 @@ TEST(Restart, TermInEachStateIsSafeWithinTwoSeconds) {
     EXPECT_FALSE(cell.plc.result_valid());
     EXPECT_FALSE(cell.plc.ready());
   }
+}
+
+TEST(Restart, ARequestThatComesWithTheTermStartsNothing) {
+  EmulatedCell cell{test_folder().load(coarse_cell()), empty_scene()};
+  ASSERT_TRUE(cell.run_until_ready());
+  cell.plc_writes(plc::at("sequence"), 99);
+  cell.plc_writes(plc::at("part_id"), 1);
+  cell.plc_writes(plc::at("supply_id"), 1);
+  cell.plc_writes(plc::at("control"), plc::control::kRequest | plc::control::kRobotClear);
+  cell.cell().shut_down(cell.now());
+  cell.cell().run(cell.now());
+  EXPECT_EQ(cell.cell().state(), daemon::CellState::Idle);
+  EXPECT_EQ(cell.cell().sweep_state(), drivers::sweep::State::Idle);
+  EXPECT_TRUE(cell.cell().safe());
 }
 }  // namespace binpick::support

@@ -200,4 +200,13 @@ std::optional<emulators::PlcResult> EmulatedCell::pick(std::uint16_t part_id, st
   run_until([&] { return (result = plc.take_result()).has_value(); });
   return result;
 }
+
+void EmulatedCell::plc_writes(std::uint16_t offset, std::uint16_t value) {
+  Bytes frame;
+  for (const int word : {0x0009, 0x0000, 0x0006, 0xFF06}) append_be(frame, static_cast<std::uint16_t>(word));
+  append_be(frame, offset);
+  append_be(frame, value);
+  cell_->plc().on_bytes(plc_connection_, frame, now_);
+  cell_->plc().take_output(plc_connection_);
+}
 }  // namespace binpick::support
