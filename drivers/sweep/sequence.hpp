@@ -49,7 +49,7 @@ inline constexpr std::array kRows{
     Row{State::Measuring, Input::Deadline, State::Idle, Effect::StopAndFail},
     Row{State::Sweeping, Input::Deadline, State::Idle, Effect::StopAndFail},
     Row{State::Draining, Input::Deadline, State::Idle,
-        Effect::Finish},  // all profiles are in; only the goodbye is missing
+        Effect::Finish},  // all profiles are in, else it is DeviceFailed; only the goodbye is missing
     Row{State::Preparing, Input::Abort, State::Idle, Effect::StopQuietly},
     Row{State::PivotAtStart, Input::Abort, State::Idle, Effect::StopQuietly},
     Row{State::Measuring, Input::Abort, State::Idle, Effect::StopQuietly},

@@ -10,6 +10,9 @@ namespace {
 constexpr Duration kPrepareMax = std::chrono::seconds(12);
 /// After the pivot stands: the scanner says goodbye, and one more pivot sample arrives.
 constexpr Duration kDrainMax = std::chrono::milliseconds(300);
+/// A scanner that says no goodbye has still measured the whole sweep when its last profile is not older than this at
+/// the pivot's end. Else it fell silent before, for too short a time to be missed while measuring.
+constexpr Duration kLastProfileAge = std::chrono::milliseconds(50);
 /// Allowed on top of the time that the plan itself takes.
 constexpr Duration kSweepSlack = std::chrono::seconds(2);
 constexpr std::size_t kWaitingMax = 2000;  // 4 s of profiles at the highest rate
@@ -30,6 +33,7 @@ void Sweep::begin(const Plan& plan, TimePoint now) {
   failure_ = {Failed::Device::None, "the sweep did not come to its end in time"};
   move_began_.reset();
   move_ended_.reset();
+  last_profile_at_.reset();
   apply(Input::Begin, now);
 }
 
@@ -61,6 +65,7 @@ void Sweep::on_scanner(const lms400::Event& event, TimePoint now) {
                  [&](const lms400::ProfileReceived& received) {
                    apply(Input::FirstProfile, now);
                    if (state_ != State::Sweeping && state_ != State::Draining) return;
+                   last_profile_at_ = received.profile.measured_at;
                    waiting_.push_back(received.profile);
                    if (waiting_.size() > kWaitingMax) {
                      waiting_.pop_front();
@@ -81,7 +86,14 @@ void Sweep::on_scanner(const lms400::Event& event, TimePoint now) {
 }
 
 void Sweep::on_deadline(TimePoint now) {
-  if (deadline_ && now >= *deadline_) apply(Input::Deadline, now);
+  if (!deadline_ || now < *deadline_) return;
+  if (state_ == State::Draining && (!last_profile_at_ || *last_profile_at_ < *move_ended_ - kLastProfileAge)) {
+    failure_ = {Failed::Device::Scanner,
+                "the scanner fell silent before the end of the sweep; check its power and cable"};
+    apply(Input::DeviceFailed, now);
+    return;
+  }
+  apply(Input::Deadline, now);
 }
 
 std::optional<Event> Sweep::take_event() {

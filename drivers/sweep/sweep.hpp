@@ -67,7 +67,7 @@ class Sweep {
   std::optional<TimePoint> deadline_;
   AngleTrack track_;
   std::deque<lms400::Profile> waiting_;  // for a pivot sample later than themselves
-  std::optional<TimePoint> move_began_, move_ended_;
+  std::optional<TimePoint> move_began_, move_ended_, last_profile_at_;
   Done done_;
   Failed failure_;
   std::deque<Event> events_;

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <gtest/gtest.h>
@@ -56,6 +57,34 @@ TEST_P(WholePick, FromThePlcsRequestToTheRobotsReport) {
   EXPECT_LT(Angle::rad(error.angle_rad).in_deg(), 3.0);
 }
 INSTANTIATE_TEST_SUITE_P(BothWordOrders, WholePick, testing::Values("s7", "logix"));
+
+TEST(Cycle, AScannerThatFallsSilentJustBeforeTheEndIsAFaultNotAnEmptySupply) {
+  EmulatedCell cell{test_folder().load(coarse_cell()), empty_scene()};
+  ASSERT_TRUE(cell.run_until_ready());
+  const auto whole = cell.pick();
+  ASSERT_TRUE(whole.has_value());
+  ASSERT_EQ(whole->code, plc::ResultCode::SupplyEmpty);
+  ASSERT_TRUE(cell.run_until_ready());
+
+  // Too short a silence to be noticed while measuring (scanner.profile_timeout_ms), yet a strip that nobody looked at.
+  cell.plc.forget_alarms_seen();
+  cell.plc.raise_request(1, 1);
+  ASSERT_TRUE(cell.run_until([&] { return cell.cell().sweep_state() == drivers::sweep::State::Sweeping; }));
+  cell.run_for(std::chrono::milliseconds(whole->figures.sweep_ms) - 250ms);
+  cell.scanner.faults.silent = true;
+  ASSERT_TRUE(cell.run_until([&] { return cell.plc.fault() || cell.plc.result_valid(); }, 8s));
+  EXPECT_TRUE(cell.plc.fault());
+  EXPECT_FALSE(cell.plc.result_valid());
+  EXPECT_NE(std::ranges::find(cell.plc.alarms_seen(), plc::Alarm::ScannerNoReply), cell.plc.alarms_seen().end());
+
+  cell.run_for(2s);  // until the unanswered stop is given up
+  cell.scanner.faults = {};
+  cell.plc.raise_reset();
+  ASSERT_TRUE(cell.run_until_ready());
+  const auto again = cell.pick();
+  ASSERT_TRUE(again.has_value());
+  EXPECT_EQ(again->code, plc::ResultCode::SupplyEmpty);
+}
 
 TEST(Cycle, AnEmptySupplyIsEmptyAForeignPartIsNothingFoundASteepOneIsNotReachable) {
   {
