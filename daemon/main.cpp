@@ -1,6 +1,5 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <future>
 #include <signal.h>
 #include <string>
 #include <sys/epoll.h>
@@ -13,6 +12,8 @@
 #include "daemon/boot_count.hpp"
 #include "daemon/cell.hpp"
 #include "daemon/links.hpp"
+#include "daemon/progress_watch.hpp"
+#include "daemon/reloader.hpp"
 #include "daemon/vision_worker.hpp"
 #include "drivers/link/loop.hpp"
 
@@ -21,39 +22,6 @@ namespace binpick::daemon {
 namespace {
 constexpr int kExitConfig = 78;                                 // EX_CONFIG: systemd does not try again
 constexpr Duration kStopMax = std::chrono::milliseconds(1500);  // SIGTERM to exit, well inside the promised 2 s
-constexpr Duration kDetectionHangs = std::chrono::seconds(20);  // no detection and no picture takes this long
-
-using Loaded = Expected<std::shared_ptr<const CellData>, std::vector<std::string>>;
-
-/// A reload reads files and verifies knowledge bases: that is too long for the loop, so a thread of its own does it.
-class Reloader {
- public:
-  explicit Reloader(drivers::link::Loop& loop) : loop_{loop} {}
-  void start(const std::string& path) {
-    if (running_.valid()) {
-      again_ = true;  // an edit during a reload: read once more after it
-      return;
-    }
-    running_ = std::async(std::launch::async, [this, path] {
-      auto loaded = load_cell(path);
-      loop_.wake();
-      return loaded;
-    });
-  }
-  std::optional<Loaded> take(const std::string& path) {
-    if (!running_.valid() || running_.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
-      return std::nullopt;
-    auto loaded = running_.get();
-    if (std::exchange(again_, false)) start(path);
-    return loaded;
-  }
-  bool pending() const { return running_.valid(); }
-
- private:
-  drivers::link::Loop& loop_;
-  std::future<Loaded> running_;
-  bool again_ = false;
-};
 
 /// SIGTERM, SIGINT and SIGHUP as readable events. Blocked before any thread starts, so that all threads inherit it.
 int open_signals() {
@@ -73,21 +41,17 @@ class Watchdog {
     if (sd_watchdog_enabled(0, &us) > 0) period_ = std::chrono::microseconds(us) / 3;
   }
   std::optional<TimePoint> deadline() const { return period_.count() > 0 ? std::optional{next_} : std::nullopt; }
-  void turn(const VisionWorker& worker, TimePoint now) {
-    if (worker.progress() != progress_ || !worker.busy()) {
-      progress_ = worker.progress();
-      progress_at_ = now;
-    }
+  void turn(const VisionWorker& worker, Duration detection_deadline, TimePoint now) {
+    const bool alive = progress_.alive(worker.progress(), worker.busy(), detection_deadline, now);
     if (period_.count() == 0 || now < next_) return;
     next_ = now + period_;
-    if (now - progress_at_ < kDetectionHangs) sd_notify(0, "WATCHDOG=1");
+    if (alive) sd_notify(0, "WATCHDOG=1");
   }
 
  private:
   Duration period_{0};  // 0: no watchdog is wanted
   TimePoint next_{};
-  std::uint64_t progress_ = 0;
-  TimePoint progress_at_{};
+  ProgressWatch progress_;
 };
 
 int run(const std::string& path) {
@@ -104,7 +68,7 @@ int run(const std::string& path) {
   drivers::link::Loop loop;
   Links links{loop, cell};
   VisionWorker worker{[&loop] { loop.wake(); }};
-  Reloader reloader{loop};
+  Reloader reloader{[&path] { return load_cell(path); }, [&loop] { loop.wake(); }};
   Watchdog watchdog;
   std::optional<TimePoint> stop_by;
 
@@ -113,7 +77,7 @@ int run(const std::string& path) {
     while (read(signals, &info, sizeof info) == static_cast<ssize_t>(sizeof info)) {
       if (info.ssi_signo == SIGHUP) {
         sd_notifyf(0, "RELOADING=1\nSTATUS=reading %s", path.c_str());
-        reloader.start(path);
+        reloader.start();
       } else if (!stop_by) {
         BINPICK_LOG(Notice, "daemon", "stopping");
         sd_notify(0, "STOPPING=1");
@@ -131,13 +95,13 @@ int run(const std::string& path) {
   while (true) {
     links.on_deadline(now);
     if (auto result = worker.take_result()) cell.on_detect_result(std::move(*result), now);
-    if (auto edited = reloader.take(path)) {
+    if (auto edited = reloader.take()) {
       if (*edited) {
         cell.reload(std::move(**edited));
       } else {
         cell.reload_refused(edited->error(), now);
       }
-      sd_notify(0, "READY=1\nSTATUS=running");
+      if (!reloader.pending() && !stop_by) sd_notify(0, "READY=1\nSTATUS=running");
     }
     cell.run(now);
     if (auto request = cell.take_detect_request()) {
@@ -151,14 +115,14 @@ int run(const std::string& path) {
       }
     }
     links.flush(now);
-    watchdog.turn(worker, now);
+    watchdog.turn(worker, cell.data().config.detection.deadline, now);
     if (stop_by && (cell.safe() || now >= *stop_by)) break;
     now = loop.wait(earlier(earlier(cell.deadline(), links.deadline()), earlier(watchdog.deadline(), stop_by)));
   }
   links.flush(clock.now());
   BINPICK_LOG(Notice, "daemon", "stopped%s", cell.safe() ? "" : ", but the pivot did not answer");
-  if (worker.busy()) {
-    // A detection cannot be broken off; nobody waits for this one any more.
+  if (worker.busy() || reloader.pending()) {
+    // Neither a detection nor a slow file system can be broken off; nobody waits for them any more.
     std::fflush(nullptr);
     _exit(0);
   }
