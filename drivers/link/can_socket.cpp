@@ -62,6 +62,22 @@ std::optional<std::uint32_t> overflow_of(msghdr& message) {
 }
 }  // namespace
 
+std::string no_can_socket_text(int error) {
+  constexpr const char* kSandbox = "the service's sandbox has no AF_CAN in RestrictAddressFamilies=";
+  constexpr const char* kRemedy = "; cannelloni://HOST:PORT does without";
+  const std::string text = "cannot open a CAN socket: " + error_text(error) + "; ";
+  switch (error) {
+    case EAFNOSUPPORT:  // what systemd's filter answers looks like a kernel without CAN
+    case EPROTONOSUPPORT:
+      return text + "either the kernel has no CAN (modprobe can_raw), or " + kSandbox + kRemedy;
+    case EPERM:
+    case EACCES:
+      return text + "refused by a sandbox, a container or a security module: perhaps " + kSandbox + kRemedy;
+    default:
+      return text + "see the kernel's log (dmesg)" + kRemedy;
+  }
+}
+
 CanSocket::CanSocket(Loop& loop, std::string interface, std::vector<CanFilter> filters, CanPeer peer)
     : loop_{loop},
       interface_{std::move(interface)},
@@ -87,9 +103,7 @@ void CanSocket::on_deadline(TimePoint now) {
 
 std::string CanSocket::try_open() {
   const int fd = ::socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW);
-  if (fd < 0)
-    return errno == EAFNOSUPPORT ? "this kernel has no CAN: load can_raw, or use cannelloni://HOST:PORT"
-                                 : "cannot open a CAN socket: " + error_text(errno);
+  if (fd < 0) return no_can_socket_text(errno);
   const auto failed = [fd](const std::string& why) {
     ::close(fd);
     return why;

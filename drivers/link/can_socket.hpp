@@ -16,6 +16,9 @@ inline constexpr std::uint32_t kBusOff = 0x040;
 inline constexpr std::uint32_t kRestarted = 0x100;
 }  // namespace can_error
 
+/// Why socket(PF_CAN) gave `error`, as far as can be told from it, and what to do.
+std::string no_can_socket_text(int error);
+
 /// One SocketCAN interface: exact filters, error frames, the kernel's receive times. An interface that is down or gone
 /// is on_down; it is looked for again after 200 ms, 400 ms … 1 s.
 class CanSocket final : public CanLink {

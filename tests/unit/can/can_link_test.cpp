@@ -1,4 +1,5 @@
 #include <arpa/inet.h>
+#include <cerrno>
 #include <gtest/gtest.h>
 #include <netinet/in.h>
 #include <stdexcept>
@@ -9,6 +10,7 @@
 
 #include "base/log.hpp"
 #include "drivers/link/can.hpp"
+#include "drivers/link/can_socket.hpp"
 #include "drivers/link/cannelloni.hpp"
 #include "drivers/link/cannelloni_link.hpp"
 #include "drivers/pivot/session.hpp"
@@ -215,4 +217,15 @@ TEST(CannelloniLink, APivotIsReadyAndMovesOverUdp) {
   EXPECT_NEAR(done->in_deg(), 5, 0.1);
 }
 }  // namespace
+
+TEST(CanSocket, ARefusedSocketNamesAllThatMayRefuseIt) {
+  const auto says = [](int error, const char* words) {
+    return no_can_socket_text(error).find(words) != std::string::npos;
+  };
+  // systemd's RestrictAddressFamilies= answers EAFNOSUPPORT, as a kernel without CAN does.
+  EXPECT_TRUE(says(EAFNOSUPPORT, "kernel has no CAN") && says(EAFNOSUPPORT, "RestrictAddressFamilies="));
+  EXPECT_TRUE(says(EPERM, "RestrictAddressFamilies=") && !says(EPERM, "kernel has no CAN"));
+  EXPECT_TRUE(says(EACCES, "sandbox") && !says(EACCES, "kernel has no CAN"));
+  EXPECT_TRUE(says(ENOMEM, "Cannot allocate memory") && !says(ENOMEM, "RestrictAddressFamilies="));
+}
 }  // namespace binpick::drivers::link
