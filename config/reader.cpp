@@ -172,7 +172,12 @@ std::string endpoint_problem(const std::string& text) {
 
 std::string can_problem(const std::string& text) {
   constexpr std::string_view kScheme = "cannelloni://";
-  if (text.starts_with(kScheme)) return endpoint_problem(text.substr(kScheme.size()));
+  if (text.starts_with(kScheme)) {
+    const std::string endpoint = text.substr(kScheme.size());
+    const std::string problem = endpoint_problem(endpoint);
+    const bool port_zero = problem.empty() && std::stoi(endpoint.substr(endpoint.rfind(':') + 1)) == 0;
+    return port_zero ? "has the port 0; give the port of the bridge, 1 … 65535" : problem;
+  }
   if (text.find("://") != std::string::npos) return "has an unknown scheme; use cannelloni://HOST:PORT";
   // IFNAMSIZ is 16 with the final zero.
   if (text.empty() || text.size() > 15 || text.find_first_of(" /:\t") != std::string::npos)

@@ -142,6 +142,8 @@ INSTANTIATE_TEST_SUITE_P(
                 "plc.allow: \"plc1\" is no IP address; write each as \"192.168.0.10\""},
         Mistake{"can = \"can0\"", "can = \"slcan://x\"", "can = ", 7,
                 "pivot.can = \"slcan://x\" has an unknown scheme; use cannelloni://HOST:PORT"},
+        Mistake{"can = \"can0\"", "can = \"cannelloni://10.0.0.2:0\"", "can = ", 7,
+                "pivot.can = \"cannelloni://10.0.0.2:0\" has the port 0; give the port of the bridge, 1 … 65535"},
         Mistake{
             "can = \"can0\"", "can = \"an_interface_far_too_long\"", "can = ", 7,
             "pivot.can = \"an_interface_far_too_long\" is no network interface; use can0 or cannelloni://HOST:PORT"},
