@@ -1,9 +1,9 @@
 #include "daemon/links.hpp"
 
-#include <algorithm>
 #include <stdexcept>
 
 #include "base/log.hpp"
+#include "base/peer_address.hpp"
 
 namespace binpick::daemon {
 namespace link = drivers::link;
@@ -48,10 +48,6 @@ link::StreamPeer scanner_peer(Cell& cell) {
       .take_output = [&cell] { return cell.scanner().take_output(); },
   };
 }
-
-bool allowed(const std::vector<std::string>& allow, const std::string& address) {
-  return address == "127.0.0.1" || address == "::1" || std::ranges::find(allow, address) != allow.end();
-}
 }  // namespace
 
 Links::Links(link::Loop& loop, Cell& cell)
@@ -65,7 +61,7 @@ Links::Links(link::Loop& loop, Cell& cell)
       link::ServerPeer{
           .on_accept =
               [this](link::ConnectionId id, const std::string& address, std::uint16_t, TimePoint now) {
-                if (!allowed(cell_.data().config.robot_allow, address)) {
+                if (!may_connect(cell_.data().config.robot_allow, address)) {
                   BINPICK_LOG(Warning, "robot", "%s refused: not in robot.allow", address.c_str());
                   return false;
                 }

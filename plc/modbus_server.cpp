@@ -1,48 +1,27 @@
 #include "plc/modbus_server.hpp"
 
 #include <algorithm>
-#include <arpa/inet.h>
-#include <array>
 
 #include "base/log.hpp"
+#include "base/peer_address.hpp"
 
 namespace binpick::plc::modbus {
 namespace {
 /// Addresses told of in the log, per reason; beyond it a flood of addresses is silent.
 constexpr std::size_t kToldMax = 256;
-
-/// One spelling per address: IPv4-mapped IPv6 unmapped, IPv6 shortened. What is no address stays as it is.
-std::string canonical(const std::string& address) {
-  std::array<char, INET6_ADDRSTRLEN> text{};
-  in_addr v4{};
-  if (inet_pton(AF_INET, address.c_str(), &v4) == 1) return inet_ntop(AF_INET, &v4, text.data(), text.size());
-  in6_addr v6{};
-  if (inet_pton(AF_INET6, address.c_str(), &v6) != 1) return address;
-  if (IN6_IS_ADDR_V4MAPPED(&v6)) return inet_ntop(AF_INET, &v6.s6_addr[12], text.data(), text.size());
-  return inet_ntop(AF_INET6, &v6, text.data(), text.size());
-}
-
-bool loopback(const std::string& canonical_address) {
-  in_addr v4{};
-  if (inet_pton(AF_INET, canonical_address.c_str(), &v4) == 1) return (ntohl(v4.s_addr) >> 24) == 127;
-  return canonical_address == "::1";
-}
 }  // namespace
 
 Server::Server(const ServerOptions& options, const Limits& limits, ServerCalls calls)
     : options_{options}, limits_{limits}, calls_{std::move(calls)}, reply_{std::size_t{limits.first} + limits.count} {}
 
-bool Server::allowed(const std::string& address) const {
-  return loopback(address) ||
-         std::ranges::any_of(options_.allow, [&](const std::string& allow) { return canonical(allow) == address; });
-}
+bool Server::allowed(const std::string& address) const { return may_connect(options_.allow, address); }
 
 bool Server::first_time(std::set<std::string>& told, const std::string& address) {
   return told.size() < kToldMax && told.insert(address).second;
 }
 
 bool Server::on_accept(ConnectionId id, const std::string& raw_address, std::uint16_t port, TimePoint now) {
-  const std::string address = canonical(raw_address);
+  const std::string address = canonical_address(raw_address);
   if (!allowed(address)) {
     if (first_time(told_strangers_, address))
       BINPICK_LOG(Warning, "plc", "stranger %s:%u refused; add it to plc.allow if it is the PLC", address.c_str(),

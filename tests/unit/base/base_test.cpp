@@ -6,6 +6,7 @@
 #include "base/clock.hpp"
 #include "base/frames.hpp"
 #include "base/log.hpp"
+#include "base/peer_address.hpp"
 #include "base/units.hpp"
 
 namespace binpick {
@@ -63,5 +64,14 @@ TEST(Log, OneEventIsOneLineAndThresholdHolds) {
   log::set_sink({});
   ASSERT_EQ(lines.size(), 1U);
   EXPECT_EQ(lines[0], "plc: request raised, cycle=118");
+}
+
+TEST(PeerAddress, IsAllowedInWhateverSpelling) {
+  const std::vector<std::string> allow{"2001:DB8:0::1", "::ffff:10.0.0.5"};
+  EXPECT_TRUE(may_connect(allow, "2001:db8::1"));
+  EXPECT_TRUE(may_connect(allow, "10.0.0.5"));
+  EXPECT_FALSE(may_connect(allow, "10.0.0.6"));
+  EXPECT_TRUE(may_connect({}, "127.0.0.1") && may_connect({}, "127.0.1.1") && may_connect({}, "::1"));
+  EXPECT_FALSE(may_connect({}, ""));
 }
 }  // namespace binpick
