@@ -80,6 +80,40 @@ void check_sweeps(const Config& c, const CellPlaces& at, Findings& findings) {
   }
 }
 
+/// In the middle of a sweep the scanner's middle ray goes down into the supply, or at most half its size beside it.
+/// What looks elsewhere is metres for millimetres, radians for degrees, or a mount with a wrong sign.
+void check_views(const Config& c, const CellPlaces& at, Findings& findings) {
+  const bool mounted = at.given("pivot", "T_base_pivot") && at.given("scanner", "T_pivot_scanner");
+  for (std::size_t i = 0; mounted && i < c.supplies.size(); ++i) {
+    const Supply& supply = c.supplies[i];
+    const Places& places = at.supplies[i];
+    const auto given = [&](const char* key) { return places.given(key); };
+    if (!given("T_base_supply") || !given("size_mm") || !given("sweep_start_deg") || !given("sweep_end_deg")) continue;
+    const double pivot_rad = (supply.sweep_start.in_rad() + supply.sweep_end.in_rad()) / 2;
+    const double ray_rad = c.scanner.start.in_rad() + c.scanner.range.in_rad() / 2;
+    const Eigen::Isometry3d T_supply_scanner = supply.T_base_supply.iso.inverse() * c.mount.T_base_pivot.iso *
+                                               Eigen::AngleAxisd(pivot_rad, Eigen::Vector3d::UnitZ()) *
+                                               c.mount.T_pivot_scanner.iso;
+    const Eigen::Vector3d from = T_supply_scanner.translation();
+    const Eigen::Vector3d ray = T_supply_scanner.linear() * Eigen::Vector3d{std::cos(ray_rad), 0, std::sin(ray_rad)};
+    std::string where;
+    if (from.z() < supply.size_mm.z()) {
+      where = "the scanner stands at z = " + rounded(std::round(from.z()) + 0.0) + " mm, below the walls' tops";
+    } else if (ray.z() > -0.1) {
+      where = "it never looks down into it";
+    } else {
+      const Eigen::Vector3d hit = from - ray * (from.z() / ray.z());
+      if (std::abs(hit.x()) <= supply.size_mm.x() && std::abs(hit.y()) <= supply.size_mm.y()) continue;
+      where = "it meets the floor at x = " + rounded(std::round(hit.x()) + 0.0) +
+              ", y = " + rounded(std::round(hit.y()) + 0.0) + " mm from its middle";
+    }
+    findings.add(
+        places.of("T_base_supply"),
+        "in the middle of the sweep the scanner does not look into the supply: " + where +
+            "; correct T_base_pivot, T_pivot_scanner, T_base_supply (mm, degrees, signs) or the sweep's angles");
+  }
+}
+
 template <class Entry>
 void check_ids(const std::vector<Entry>& entries, const std::vector<Places>& places, const std::string& section,
                Findings& findings) {
@@ -97,6 +131,7 @@ void check_rules(const Config& config, const CellPlaces& places, Findings& findi
   check_devices(config, places, findings);
   check_servers(config, places, findings);
   check_sweeps(config, places, findings);
+  check_views(config, places, findings);
   check_ids(config.supplies, places.supplies, "supply", findings);
   check_ids(config.recipes, places.parts, "part", findings);
 }

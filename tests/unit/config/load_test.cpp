@@ -44,7 +44,8 @@ TEST(Load, ExampleCellIsGoodAndInInnerUnits) {
 TEST(Load, RotationsAreAboutFixedAxesXThenYThenZ) {
   CellFolder folder;
   folder.edit("T_base_pivot = { xyz_mm = [1200, 0, 1860], rpy_deg = [0, 90, 0] }",
-              "T_base_pivot = { xyz_mm = [1, 2, 3], rpy_deg = [90, 0, 90] }");
+              "T_base_pivot = { xyz_mm = [1201, 2, 1863], rpy_deg = [90, 0, 90] }");
+  folder.edit("rpy_deg = [180, -90, 0] }", "rpy_deg = [90, -90, 0] }");  // so that it looks down again
   const auto loaded = folder.load();
   ASSERT_TRUE(loaded.has_value()) << folder.findings();
   // x is turned to y by the last turn; y to z by the first, which the last leaves alone; z to -y to x.
@@ -52,18 +53,18 @@ TEST(Load, RotationsAreAboutFixedAxesXThenYThenZ) {
   expected << 0, 0, 1, 1, 0, 0, 0, 1, 0;
   const auto& T = loaded->mount.T_base_pivot.iso;
   EXPECT_TRUE(T.linear().isApprox(expected, 1e-12)) << T.matrix();
-  EXPECT_EQ(T.translation(), Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(T.translation(), Eigen::Vector3d(1201, 2, 1863));
 }
 
 TEST(Load, AbsentKeysHaveTheTablesDefaults) {
   CellFolder folder;
   folder.cell = R"([pivot]
 can = "cannelloni://10.0.0.2:20000"
-T_base_pivot = { xyz_mm = [0, 0, 0], rpy_deg = [0, 0, 0] }
+T_base_pivot = { xyz_mm = [0, 0, 500], rpy_deg = [0, 90, 0] }
 [scanner]
 model = "lms400"
 address = "[fd00::1]:2111"
-T_pivot_scanner = { xyz_mm = [0, 0, 0], rpy_deg = [0, 0, 0] }
+T_pivot_scanner = { xyz_mm = [0, 0, 0], rpy_deg = [180, -90, 0] }
 [[supply]]
 id = 7
 size_mm = [100, 100, 100.5]
@@ -165,6 +166,26 @@ INSTANTIATE_TEST_SUITE_P(Sections, OneMistake,
                                                  "[supply] is a list; write it in double brackets, [[supply]]"},
                                          Mistake{"[pivot]", "[[pivot]]", "[[pivot]]", 3,
                                                  "[[pivot]] stands for one thing only; write [pivot]"}));
+
+TEST(Load, AScannerThatLooksPastTheSupplyIsAMistake) {
+  const std::string supply = "T_base_supply = { xyz_mm = [1200, 0, 0], rpy_deg = [0, 0, 0] }";
+  const std::string pivot = "T_base_pivot = { xyz_mm = [1200, 0, 1860], rpy_deg = [0, 90, 0] }";
+  const std::string head = "in the middle of the sweep the scanner does not look into the supply: ";
+  struct Wrong {
+    std::string from, to, why;
+  };
+  for (const Wrong& wrong : {Wrong{supply, "T_base_supply = { xyz_mm = [1.2, 0, 0], rpy_deg = [0, 0, 0] }",
+                                   "it meets the floor at x = 1199, y = 0 mm"},
+                             Wrong{pivot, "T_base_pivot = { xyz_mm = [1200, 0, 1860], rpy_deg = [0, 1.5708, 0] }",
+                                   "it never looks down into it"},
+                             Wrong{pivot, "T_base_pivot = { xyz_mm = [1.2, 0, 1.86], rpy_deg = [0, 90, 0] }",
+                                   "the scanner stands at z = -58 mm, below the walls' tops"}}) {
+    CellFolder folder;
+    folder.edit(wrong.from, wrong.to);
+    EXPECT_FALSE(folder.load().has_value());
+    EXPECT_NE(folder.findings().find(head + wrong.why), std::string::npos) << folder.findings();
+  }
+}
 
 INSTANTIATE_TEST_SUITE_P(
     AcrossKeys, OneMistake,
