@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <mutex>
 #include <numbers>
 
 #include "vision/feature.hpp"
@@ -35,6 +36,8 @@ constexpr double kWallGateDiameters = 0.04;
 constexpr double kSameDiameters = 0.12;
 /// Below this a hypothesis is no detection.
 constexpr double kScoreMin = 0.1;
+/// From this on a pose is valid by itself.
+constexpr double kValidScore = 0.5;
 
 /// Supply's floor: known, or found as the level below which there is nothing and on which much lies, or unknown.
 float floor_of(const Scene& scene, const SupplyBox& supply) {
@@ -91,18 +94,24 @@ class Detecting {
     const std::vector<Eigen::Vector3f> maxima = anchors();
     report_.maxima = maxima.size();
     ended("maxima");
+    observed({"maxima", maxima, {}});
     const std::vector<Ballot> ballots = ballots_of(maxima);
     ended("votes");
+    observed("votes", ballots, [&](const Ballot& b) { return pose_at(maxima[b.maximum], part_.views[b.view]).iso(); });
     std::vector<Hypothesis> hypotheses = tested(maxima, ballots);
     ended("sparse test");
+    observed("sparse test", hypotheses, [](const Hypothesis& h) { return h.pose.iso(); });
     nudge(hypotheses);
     hypotheses = distinct(std::move(hypotheses));
     ended("first refinement");
+    observed("first refinement", hypotheses, [](const Hypothesis& h) { return h.pose.iso(); });
     std::vector<Candidate> candidates = rendered(hypotheses);
     add_turned(candidates);
     ended("rendered test");
+    observed("rendered test", candidates, [](const Candidate& c) { return c.pose.iso(); });
     report(select(scene_, rasteriser_, part_.symmetry, std::move(candidates), select_options()));
     ended("selection");
+    observed("selection", report_.detections, [](const Detection& d) { return d.T_supply_object.iso; });
     report_.time_ms = milliseconds_since(start_);
     return std::move(report_);
   }
@@ -114,6 +123,23 @@ class Detecting {
   void ended(const char* stage) {
     report_.stages_ms[stage] = milliseconds_since(stage_start_);
     stage_start_ = SteadyClock::now();
+  }
+
+  /// Tells the observer what is alive. Its time is not detection's.
+  void observed(const StageSurvivors& survivors) {
+    if (!options_.observer) return;
+    const auto begin = SteadyClock::now();
+    options_.observer(survivors);
+    const auto spent = SteadyClock::now() - begin;
+    start_ += spent;
+    stage_start_ += spent;
+  }
+  template <class Items, class IsoOf>
+  void observed(std::string_view stage, const Items& items, const IsoOf& iso_of) {
+    if (!options_.observer) return;
+    std::vector<Transform<frame::Supply, frame::Object>> poses;
+    for (const auto& item : items) poses.push_back({iso_of(item)});
+    observed({stage, {}, poses});
   }
 
   /// How far apart the training rotations are, against the usual grid: a rotation's error goes with the cube root of
@@ -242,11 +268,15 @@ class Detecting {
     return candidate;
   }
 
-  std::vector<Candidate> rendered(const std::vector<Hypothesis>& hypotheses) const {
+  std::vector<Candidate> rendered(const std::vector<Hypothesis>& hypotheses) {
     std::vector<Candidate> candidates(hypotheses.size());
     std::vector<Template> drawn(static_cast<std::size_t>(std::clamp(options_.threads, 1, 64)));
+    std::mutex first_valid;
     share(options_.threads, hypotheses.size(), deadline_, [&](std::size_t i, int thread) {
       candidates[i] = render_and_refine(hypotheses[i].pose, drawn[static_cast<std::size_t>(thread)]);
+      if (score_of(candidates[i]) < kValidScore || !outside(candidates[i].pose).empty()) return;
+      const std::scoped_lock lock{first_valid};
+      if (!report_.first) report_.first = FirstValid{{candidates[i].pose.iso()}, milliseconds_since(start_), i + 1};
     });
     std::erase_if(candidates, [](const Candidate& c) { return c.test.evidence <= 0; });
     std::stable_sort(candidates.begin(), candidates.end(),

@@ -2,9 +2,13 @@
 
 #include <Eigen/Core>
 #include <chrono>
+#include <functional>
 #include <map>
 #include <optional>
+#include <set>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/frames.hpp"
@@ -14,12 +18,22 @@
 namespace binpick::vision {
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
+/// What is still alive after a stage. For benches, which know the truth and ask where it was lost.
+struct StageSurvivors {
+  std::string_view stage;                      ///< As in DetectionReport::stages_ms.
+  std::span<const Eigen::Vector3f> maxima_mm;  ///< After "maxima" only: where a part's highest point may be.
+  std::span<const Transform<frame::Supply, frame::Object>> poses;  ///< After every later stage, strongest first.
+};
+using StageObserver = std::function<void(const StageSurvivors&)>;
+
 struct DetectorOptions {
   int hypotheses_max = 16384;                         ///< Bound of the hypotheses that are tested.
   std::optional<double> noise_mm;                     ///< Expected depth noise, 1 sd; default: the knowledge base's.
   std::optional<std::chrono::milliseconds> deadline;  ///< Return the best so far.
   int threads = 2;                                    ///< The result does not depend on it.
   int detections_max = 0;                             ///< 0: unlimited.
+  StageObserver observer;                             ///< Called after each stage; empty: nothing is done for it.
+  std::set<std::string, std::less<>> without;         ///< Additions to leave out, to see what each brings.
 };
 
 struct Detection {
@@ -36,12 +50,20 @@ struct Rejection {
   std::string reason;  ///< "free space seen through it", "edges missing", "explained by a better one" …
 };
 
+/// The first pose that stood every test by itself, before it was compared with the others.
+struct FirstValid {
+  Transform<frame::Supply, frame::Object> T_supply_object;
+  double time_ms = 0;          ///< Since the start of detect().
+  std::size_t hypotheses = 0;  ///< Rendered and compared up to and with it.
+};
+
 /// What happened, also when nothing was found: the operator's question is "why not?".
 struct DetectionReport {
   std::vector<Detection> detections;  ///< Best first.
   std::vector<Rejection> rejected;    ///< Strongest hypotheses not believed, each with its reason.
   std::size_t maxima = 0;
   std::size_t hypotheses = 0;  ///< Tested against the depth image.
+  std::optional<FirstValid> first;
   std::map<std::string, double> stages_ms;
   double time_ms = 0;
 };

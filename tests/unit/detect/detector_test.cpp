@@ -1,9 +1,12 @@
 #include "vision/detector.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <gtest/gtest.h>
 #include <limits>
 #include <numbers>
+#include <string>
+#include <vector>
 
 #include "tests/unit/detect/scenes.hpp"
 #include "vision/symmetry.hpp"
@@ -160,6 +163,34 @@ TEST(Detector, TheResultDoesNotDependOnTheThreads) {
       EXPECT_EQ(report.detections[k].score, expected.detections[k].score);
     }
   }
+}
+
+TEST(Detector, AnObserverSeesTheTruePoseThroughEveryStage) {
+  const Eigen::Isometry3d truth = pose(40, -30, 0, 0.3);
+  const DepthImage image = scenes::image_of(bracket_base().mesh(), {truth}, 3);
+  std::vector<std::string> stages;
+  DetectorOptions options = scenes::options();
+  options.observer = [&](const StageSurvivors& alive) {
+    stages.emplace_back(alive.stage);
+    if (alive.stage == "maxima") {
+      EXPECT_FALSE(alive.maxima_mm.empty());
+      return;
+    }
+    double least = 1e9;
+    for (const auto& T : alive.poses) {
+      const PoseDistance d = pose_distance(T.iso, truth, bracket_base().symmetry(), 60);
+      least = std::min(least, d.centroid_mm + 60 * d.angle_rad);
+    }
+    EXPECT_LT(least, 0.15 * bracket_base().diameter_mm()) << alive.stage;
+  };
+  const DetectionReport report = detect(image, kSupply, bracket_base(), options);
+  for (const auto& [stage, ms] : report.stages_ms)
+    EXPECT_TRUE(stage == "surface" || std::ranges::find(stages, stage) != stages.end()) << stage;
+  ASSERT_TRUE(report.first);
+  EXPECT_GT(report.first->hypotheses, 0U);
+  EXPECT_LE(report.first->time_ms, report.time_ms);
+  EXPECT_LT((report.first->T_supply_object.iso.translation() - truth.translation()).norm(), 5);
+  EXPECT_EQ(report.detections.size(), detect_in(image).detections.size());
 }
 
 TEST(Detector, ADeadlineInThePastStillReturns) {
