@@ -156,7 +156,7 @@ void Cell::update_ready(TimePoint now) {
 }
 
 void Cell::apply(CellInput input, TimePoint now) {
-  const CellRow* row = find_cell_row(state_, input);
+  const CellRow* row = find_row(kCellRows, state_, input);
   if (row == nullptr) return;
   state_ = row->to;
   switch (row->effect) {
@@ -258,6 +258,8 @@ void Cell::publish(TimePoint now) {
 
 void Cell::stop_cycle(TimePoint now) {
   sweep_.abort(now);
+  // Only a move: a reference run would be broken off and put off for seconds, a faulted module would need one more
+  // reset. A sweep has stopped its pivot by itself, in whatever state.
   if (pivot_.state() == drivers::pivot::Session::State::Moving) pivot_.stop(now);
   detect_request_.reset();
   detect_result_.reset();

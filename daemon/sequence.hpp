@@ -1,7 +1,8 @@
 #pragma once
 
-#include <algorithm>
 #include <array>
+
+#include "base/state_table.hpp"
 
 /// One cycle of the cell as a table: what happens between the PLC's accepted request and its answer.
 namespace binpick::daemon {
@@ -53,14 +54,5 @@ inline constexpr std::array kCellRows{
     CellRow{CellState::Detecting, CellInput::Cancelled, CellState::Idle, CellEffect::StopQuietly},
 };
 
-/// nullptr: the input means nothing in this state and changes nothing.
-constexpr const CellRow* find_cell_row(CellState from, CellInput on) {
-  for (const CellRow& row : kCellRows)
-    if (row.from == from && row.on == on) return &row;
-  return nullptr;
-}
-
-static_assert(std::ranges::all_of(kCellRows,
-                                  [](const CellRow& row) { return find_cell_row(row.from, row.on) == &row; }),
-              "no two rows for the same state and input");
+static_assert(rows_are_unique(kCellRows), "no two rows for the same state and input");
 }  // namespace binpick::daemon

@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "base/clock.hpp"
+#include "base/state_table.hpp"
 
 /// The pick handshake seen from the cell. Pure: signals in, effects out; everything that changes the state is a row of
 /// kRows. docs/plc-registers.md holds the table and the diagram generated from it.
@@ -144,8 +145,8 @@ inline constexpr std::array kRows{
     // clang-format on
 };
 
-/// Place of the row in kRows, kRows.size() when there is none. (An index and no pointer: g++ 12 does not take
-/// comparisons of pointers for constant under its undefined-behaviour sanitizer, GCC bug 71962.)
+/// Place of the row in kRows, kRows.size() when there is none. (An index and no pointer, see
+/// base/state_table.hpp.)
 constexpr std::size_t row_index(State from, Signal on) {
   for (std::size_t i = 0; i < kRows.size(); ++i)
     if (kRows[i].from == from && kRows[i].on == on) return i;
@@ -158,11 +159,6 @@ constexpr const Row* find_row(State from, Signal on) {
 }
 
 namespace detail {
-constexpr bool rows_are_unique() {
-  for (std::size_t i = 0; i < kRows.size(); ++i)
-    if (row_index(kRows[i].from, kRows[i].on) != i) return false;
-  return true;
-}
 /// Whatever the PLC says, and whatever fails, has an answer in every state.
 constexpr bool nothing_is_left_unanswered() {
   constexpr std::array kAlways{Signal::NewRequest,     Signal::BadRequest,  Signal::RepeatedRequest,
@@ -174,7 +170,7 @@ constexpr bool nothing_is_left_unanswered() {
   return true;
 }
 }  // namespace detail
-static_assert(detail::rows_are_unique());
+static_assert(rows_are_unique(kRows));
 static_assert(detail::nothing_is_left_unanswered());
 
 struct Timeouts {

@@ -1,7 +1,8 @@
 #pragma once
 
-#include <algorithm>
 #include <array>
+
+#include "base/state_table.hpp"
 
 /// The sweep as a table. Pure: events in, effects out.
 namespace binpick::drivers::sweep {
@@ -57,13 +58,5 @@ inline constexpr std::array kRows{
     Row{State::Draining, Input::Abort, State::Idle, Effect::StopQuietly},
 };
 
-/// nullptr: the input means nothing in this state and changes nothing.
-constexpr const Row* find_row(State from, Input on) {
-  for (const Row& row : kRows)
-    if (row.from == from && row.on == on) return &row;
-  return nullptr;
-}
-
-static_assert(std::ranges::all_of(kRows, [](const Row& row) { return find_row(row.from, row.on) == &row; }),
-              "no two rows for the same state and input");
+static_assert(rows_are_unique(kRows), "no two rows for the same state and input");
 }  // namespace binpick::drivers::sweep

@@ -104,7 +104,7 @@ std::optional<Event> Sweep::take_event() {
 }
 
 void Sweep::apply(Input input, TimePoint now) {
-  const Row* row = find_row(state_, input);
+  const Row* row = find_row(kRows, state_, input);
   if (row == nullptr) return;
   state_ = row->to;
   switch (row->effect) {

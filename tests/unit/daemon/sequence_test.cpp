@@ -32,7 +32,7 @@ TEST(CellSequence, EveryStateComesBackToIdle) {
 TEST(CellSequence, EveryRunningStateCanBeCancelledAndStopsThePivot) {
   using daemon::CellState;
   for (const auto state : {CellState::AwaitingClear, CellState::Sweeping, CellState::Detecting}) {
-    const auto* row = daemon::find_cell_row(state, daemon::CellInput::Cancelled);
+    const auto* row = find_row(daemon::kCellRows, state, daemon::CellInput::Cancelled);
     ASSERT_NE(row, nullptr);
     EXPECT_EQ(row->to, CellState::Idle);
     EXPECT_EQ(row->effect, daemon::CellEffect::StopQuietly);
@@ -57,7 +57,7 @@ TEST(SweepSequence, EveryRunningStateHasDeadlineAbortAndDeviceFailure) {
   using drivers::sweep::State;
   for (const auto state : {State::Preparing, State::PivotAtStart, State::Measuring, State::Sweeping, State::Draining})
     for (const auto input : {Input::Deadline, Input::Abort, Input::DeviceFailed}) {
-      const auto* row = drivers::sweep::find_row(state, input);
+      const auto* row = find_row(drivers::sweep::kRows, state, input);
       ASSERT_NE(row, nullptr);
       EXPECT_EQ(row->to, State::Idle);
     }
