@@ -1,6 +1,9 @@
 #include "drivers/sweep/sweep.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 
 #include "base/overloaded.hpp"
 
@@ -34,7 +37,25 @@ void Sweep::begin(const Plan& plan, TimePoint now) {
   move_began_.reset();
   move_ended_.reset();
   last_profile_at_.reset();
+  if (const auto beyond = beyond_limits()) {
+    events_.emplace_back(Failed{Failed::Device::Pivot, *beyond});
+    return;
+  }
   apply(Input::Begin, now);
+}
+
+/// A sweep that the module would cut short measures less than the supply, and nobody would know.
+std::optional<std::string> Sweep::beyond_limits() const {
+  const auto module = pivot_.module();
+  if (!module) return std::nullopt;
+  const auto [low, high] = std::minmax({plan_.start.in_deg(), plan_.end.in_deg()});
+  if (low >= module->position_min.in_deg() && high <= module->position_max.in_deg()) return std::nullopt;
+  std::array<char, 200> text{};
+  std::snprintf(text.data(), text.size(),
+                "the sweep from %.1f to %.1f deg leaves the pivot module's limits of %.1f to %.1f deg; correct "
+                "sweep_start_deg and sweep_end_deg, or the module's limits",
+                low, high, module->position_min.in_deg(), module->position_max.in_deg());
+  return text.data();
 }
 
 void Sweep::abort(TimePoint now) { apply(Input::Abort, now); }
@@ -132,7 +153,12 @@ void Sweep::apply(Input input, TimePoint now) {
       done_.profiles_lost = scanner_.profiles_lost();
       done_.profiles_without_angle += waiting_.size();
       waiting_.clear();
-      events_.emplace_back(done_);
+      if (done_.profiles > 0)
+        events_.emplace_back(done_);
+      else
+        events_.emplace_back(Failed{Failed::Device::Scanner,
+                                    "no profile was measured while the pivot moved; check scanner latency_ms and pivot "
+                                    "latency_ms, and that the scanner keeps measuring"});
       break;
     case Effect::StopAndFail:
     case Effect::StopQuietly:

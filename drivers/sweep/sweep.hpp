@@ -57,6 +57,7 @@ class Sweep {
   State state() const { return state_; }
 
  private:
+  std::optional<std::string> beyond_limits() const;
   void apply(Input input, TimePoint now);
   void hand_out_profiles();
 

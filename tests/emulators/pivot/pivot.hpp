@@ -55,6 +55,9 @@ class Pivot {
   bool referenced() const { return home_ok_; }
   std::uint64_t reference_runs() const { return reference_runs_; }
 
+  /// What the commissioning tool writes into the module: its soft limits.
+  void limit_to(Angle min, Angle max) { options_.position_min = min, options_.position_max = max; }
+
   /// 24 V off and on again: the position counter starts at zero, the reference is lost.
   void power_cycle(TimePoint now, Duration off = std::chrono::milliseconds(200));
 
