@@ -11,8 +11,9 @@ constexpr std::array kAlarms{
         "No frame from the pivot module on the CAN bus within the reply time-out.",
         "Check the logic supply and the CAN cable of the pivot, both terminators, the module id and the bit rate."},
     AlarmText{Alarm::PivotModuleError, "pivot module error",
-              "The module reports an error of its own in its state word; the log names the bits.",
-              "Read the log for the bit in words, remove what blocks or overheats the pivot, then reset."},
+              "The module reports an error of its own in its state word, or cannot do what is asked of it; the log "
+              "says which.",
+              "Read the log: remove what blocks or overheats the pivot, or correct the sweep, then reset."},
     AlarmText{Alarm::PivotPowerFault, "pivot without motor supply",
               "The motor supply of the pivot is gone while its logic is alive: emergency stop, most often.",
               "Release the emergency stop, switch the motor supply on, then reset."},

@@ -245,10 +245,10 @@ TEST(Cycle, ASweepBeyondTheModulesLimitsIsAnAlarmAndNoAnswerFromHalfAScan) {
   EmulatedCell cell{test_folder().load(coarse_cell()), scene_of("track_link", 3, 2)};
   cell.pivot.limit_to(Angle::deg(-8), Angle::deg(8));
   ASSERT_TRUE(cell.run_until_ready());
-  const auto result = cell.pick();
-  ASSERT_TRUE(result.has_value());
-  EXPECT_NE(result->code, plc::ResultCode::PickFound);
+  cell.plc.raise_request(1, 1);
+  ASSERT_TRUE(cell.run_until([&] { return cell.plc.fault(); }));
   EXPECT_TRUE(cell.plc.alarms_seen().contains(plc::Alarm::PivotModuleError));
+  EXPECT_FALSE(cell.plc.result_valid());
   EXPECT_FALSE(cell.pivot.moving(cell.now()));
 }
 }  // namespace binpick::support
