@@ -1,6 +1,12 @@
 #include "daemon/cell_data.hpp"
 
 namespace binpick::daemon {
+namespace {
+Expected<vision::KnowledgeBase, vision::KnowledgeBaseError> verified(const vision::KnowledgeBase& opened) {
+  return opened.verify().map([&] { return opened; });
+}
+}  // namespace
+
 Expected<std::shared_ptr<const CellData>, std::vector<std::string>> load_cell(const std::string& path) {
   auto config = config::load(path);
   std::vector<std::string> findings;
@@ -11,13 +17,13 @@ Expected<std::shared_ptr<const CellData>, std::vector<std::string>> load_cell(co
   auto cell = std::make_shared<CellData>();
   cell->config = std::move(*config);
   for (const auto& recipe : cell->config.recipes) {
-    auto knowledge = vision::KnowledgeBase::open(recipe.knowledge_base);
+    const auto knowledge = vision::KnowledgeBase::open(recipe.knowledge_base).and_then(verified);
     if (!knowledge) {
       findings.push_back(path + ": part " + std::to_string(recipe.id) + ": " + knowledge.error().text +
                          " (make it with: binpick train " + recipe.part.path + " -o " + recipe.knowledge_base + ")");
       continue;
     }
-    cell->knowledge_bases.push_back(std::move(*knowledge));
+    cell->knowledge_bases.push_back(*knowledge);
   }
   if (!findings.empty()) return unexpected(std::move(findings));
   return std::shared_ptr<const CellData>{std::move(cell)};

@@ -94,6 +94,7 @@ int complain(int status, const std::string& text) {
 int run(const DetectArguments& arguments) {
   const auto part = vision::KnowledgeBase::open(arguments.part);
   if (!part) return complain(2, part.error().text);
+  if (const auto whole = part->verify(); !whole) return complain(2, whole.error().text);
   const auto points = vision::load_cloud(arguments.scene);
   if (!points) return complain(2, points.error().text);
   for (const std::string& path : {arguments.image, arguments.json == "-" ? std::string{} : arguments.json})

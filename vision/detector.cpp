@@ -8,6 +8,7 @@
 #include <mutex>
 #include <numbers>
 
+#include "base/check.hpp"
 #include "vision/feature.hpp"
 #include "vision/knowledge_base_impl.hpp"
 #include "vision/maxima.hpp"
@@ -424,6 +425,7 @@ class Detecting {
 
 DetectionReport detect(const DepthImage& image, const SupplyBox& supply, const KnowledgeBase& part,
                        const DetectorOptions& options) {
+  BINPICK_CHECK(part.verify());  // Votes index without a look; who opened the file has been told long before.
   return Detecting{image, supply, part, options}.run();
 }
 }  // namespace binpick::vision

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <cstring>
 #include <fcntl.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -17,17 +18,24 @@ struct Descriptor {
     if (fd >= 0) ::close(fd);
   }
 };
+
+std::string unreadable(const std::string& path, const std::string& why) {
+  return "cannot read " + path + ": " + why + "; check the path and its permissions";
+}
+
+/// Opened for reading, or why not.
+std::string open_file(const std::string& path, Descriptor& file, struct stat& status) {
+  file.fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (file.fd < 0 || ::fstat(file.fd, &status) != 0) return unreadable(path, std::strerror(errno));
+  return S_ISDIR(status.st_mode) ? unreadable(path, "it is a folder") : std::string{};
+}
 }  // namespace
 
 Expected<std::vector<std::byte>, std::string> read_file(const std::string& path) {
-  const auto failed = [&](const std::string& why) {
-    return unexpected("cannot read " + path + ": " + why + "; check the path and its permissions");
-  };
-  const Descriptor file{::open(path.c_str(), O_RDONLY | O_CLOEXEC)};
-  if (file.fd < 0) return failed(std::strerror(errno));
+  const auto failed = [&](const std::string& why) { return unexpected(unreadable(path, why)); };
+  Descriptor file{-1};
   struct stat status {};
-  if (::fstat(file.fd, &status) != 0) return failed(std::strerror(errno));
-  if (S_ISDIR(status.st_mode)) return failed("it is a folder");
+  if (auto why = open_file(path, file, status); !why.empty()) return unexpected(std::move(why));
   std::vector<std::byte> bytes;
   if (status.st_size > 0 && static_cast<std::size_t>(status.st_size) <= kFileBytesMax)
     bytes.reserve(static_cast<std::size_t>(status.st_size) + 1);
@@ -43,6 +51,27 @@ Expected<std::vector<std::byte>, std::string> read_file(const std::string& path)
     if (got == 0) return bytes;
     if (bytes.size() > kFileBytesMax) return failed("it is larger than 2 GiB");
   }
+}
+
+FileBytes kept(std::vector<std::byte> bytes) {
+  const auto keeper = std::make_shared<const std::vector<std::byte>>(std::move(bytes));
+  return {*keeper, keeper};
+}
+
+Expected<FileBytes, std::string> map_file(const std::string& path) {
+  Descriptor file{-1};
+  struct stat status {};
+  if (auto why = open_file(path, file, status); !why.empty()) return unexpected(std::move(why));
+  const auto size = static_cast<std::size_t>(status.st_size);
+  void* const at =
+      S_ISREG(status.st_mode) && size > 0 ? ::mmap(nullptr, size, PROT_READ, MAP_PRIVATE, file.fd, 0) : MAP_FAILED;
+  if (at == MAP_FAILED) {
+    auto bytes = read_file(path);
+    if (!bytes) return unexpected(bytes.error());
+    return kept(std::move(*bytes));
+  }
+  const std::shared_ptr<const void> keeper(at, [size](const void* p) { ::munmap(const_cast<void*>(p), size); });
+  return FileBytes{{static_cast<const std::byte*>(at), size}, keeper};
 }
 
 Expected<void, std::string> write_file(const std::string& path, std::span<const std::byte> bytes) {

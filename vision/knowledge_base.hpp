@@ -53,14 +53,18 @@ struct KnowledgeBaseError {
   std::string text;  ///< What, where, what to do.
 };
 
-/// Everything detection needs to know of one part: mesh, symmetry, views, features and votes. Immutable, shared freely
-/// between threads (cheap copies).
+/// Everything detection needs to know of one part: mesh, symmetry, views, features and votes. Immutable, memory-mapped
+/// when it comes from a file, shared freely between threads (cheap copies).
 class KnowledgeBase {
  public:
-  /// Reads and verifies the whole file (version, length, checksum).
+  /// Maps the file and verifies header and index (version, length, their checksum, every offset): milliseconds,
+  /// whatever the file's size. Replace the file by renaming (save() does), never write over it, while it is open.
   static Expected<KnowledgeBase, KnowledgeBaseError> open(const std::string& path);
-  /// The same for a file's bytes; `name` stands in the messages.
+  /// The same for a copy of a file's bytes; `name` stands in the messages.
   static Expected<KnowledgeBase, KnowledgeBaseError> parse(std::span<const std::byte> bytes, const std::string& name);
+  /// Verifies everything else: the whole file's checksum and the content of its lists. Done once, however often it is
+  /// called; detect() insists on it.
+  Expected<void, KnowledgeBaseError> verify() const;
   Expected<void, KnowledgeBaseError> save(const std::string& path) const;
 
   const std::string& part_name() const;

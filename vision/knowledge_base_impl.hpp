@@ -1,10 +1,14 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cstddef>
 #include <cstdint>
+#include <mutex>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "vision/file.hpp"
 #include "vision/knowledge_base.hpp"
 
 /// The inside of a knowledge base: written by training, read by detection, by nobody else.
@@ -26,19 +30,32 @@ struct SurfaceSample {
   Eigen::Vector3f normal;
 };
 
-/// One rotation of the part as seen from above.
+/// One rotation of the part as seen from above. Its lists lie in the knowledge base's bytes.
 struct View {
   Eigen::Quaternionf R_supply_object;
   /// Anchors (mean of the plateau close around the highest point; further separate maxima), best first, object frame.
-  std::vector<Eigen::Vector3f> anchors_object_mm;
-  std::vector<SurfaceSample> surface;  ///< Scattered evenly over the visible surface.
-  std::vector<Eigen::Vector3f>
-      edges_mm;         ///< On the silhouette and inner depth jumps (upper side), relative to the first anchor.
-  float lowest_mm = 0;  ///< Lowest point of the part, relative to the first anchor (negative).
-  float area_mm2 = 0;   ///< Of the silhouette.
+  /// At least one.
+  std::span<const Eigen::Vector3f> anchors_object_mm;
+  std::span<const SurfaceSample> surface;  ///< Scattered evenly over the visible surface.
+  std::span<const Eigen::Vector3f>
+      edges_mm;           ///< On the silhouette and inner depth jumps (upper side), relative to the first anchor.
+  float lowest_mm = 0;    ///< Lowest point of the part, relative to the first anchor (negative).
+  float area_mm2 = 0;     ///< Of the silhouette.
+  float vote_weight = 0;  ///< Sum of its votes' weights, 256 being one vote.
 };
 
-struct KnowledgeBase::Impl {
+/// A view that training has just made; field by field as in View.
+struct TrainedView {
+  Eigen::Quaternionf R_supply_object;
+  std::vector<Eigen::Vector3f> anchors_object_mm;
+  std::vector<SurfaceSample> surface;
+  std::vector<Eigen::Vector3f> edges_mm;
+  float lowest_mm = 0;
+  float area_mm2 = 0;
+};
+
+/// What is known of the part as a whole.
+struct PartFacts {
   std::string part_name;
   ScannerClass scanner = ScannerClass::Lps36;
   double pixel_mm = 1;
@@ -50,14 +67,33 @@ struct KnowledgeBase::Impl {
   std::uint64_t mesh_hash = 0;
   Mesh mesh;
   Symmetry symmetry;
-  std::vector<View> views;
+};
+
+struct TrainedPart : PartFacts {
+  std::vector<TrainedView> views;
   std::vector<std::uint32_t> offsets;  ///< kFeatureCount + 1: votes of feature f are [offsets[f], offsets[f + 1]).
   std::vector<Vote> votes;
 };
 
-/// Length of the file that save() writes.
-std::size_t knowledge_base_bytes(const KnowledgeBase::Impl& part);
-/// Of a whole file, its own eight bytes left out: any single flipped byte changes it.
-std::uint64_t knowledge_base_checksum(std::span<const std::byte> file);
-inline constexpr std::size_t kKnowledgeBaseLengthAt = 16, kKnowledgeBaseChecksumAt = 24;
+/// A knowledge base is the bytes of its file, mapped or in memory; what is long is used where it lies.
+struct KnowledgeBase::Impl : PartFacts {
+  std::vector<View> views;
+  std::span<const std::uint32_t> offsets;  ///< As in TrainedPart.
+  std::span<const Vote> votes;             ///< Their rotations are proven by verify() only.
+  FileBytes file;
+  std::string name;  ///< For messages.
+  mutable std::once_flag verify_once;
+  mutable Expected<void, KnowledgeBaseError> verdict;
+};
+
+/// KnowledgeBase::open() behind the reading: `name` stands in the messages.
+Expected<KnowledgeBase, KnowledgeBaseError> open_knowledge_base(FileBytes file, const std::string& name);
+/// The bytes of the file, checksums included.
+std::vector<std::byte> encoded(const TrainedPart& part);
+
+/// Where the header holds what; knowledge_base_file.cpp tells the rest of the format.
+inline constexpr std::size_t kKnowledgeBaseLengthAt = 16, kKnowledgeBaseChecksumAt = 24, kKnowledgeBaseIndexEndAt = 32,
+                             kKnowledgeBaseIndexChecksumAt = 40;
+/// Makes length and both checksums of a file's bytes right.
+void seal_knowledge_base(std::span<std::byte> file);
 }  // namespace binpick::vision

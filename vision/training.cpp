@@ -32,8 +32,8 @@ double default_pixel_mm(const Mesh& mesh, const ScannerFigures& figures, double 
 }
 
 /// What resolve() made of the options and the mesh; the votes are still to come.
-KnowledgeBase::Impl resolved(const Mesh& mesh, const PartOptions& options) {
-  KnowledgeBase::Impl part;
+PartFacts resolved(const Mesh& mesh, const PartOptions& options) {
+  PartFacts part;
   part.part_name = options.name;
   part.mesh = mesh;
   part.mesh_hash = mesh_hash(mesh);
@@ -54,11 +54,11 @@ KnowledgeBase::Impl resolved(const Mesh& mesh, const PartOptions& options) {
 }
 
 struct Trained {
-  View view;
+  TrainedView view;
   std::vector<RawVote> votes;
 };
 
-Trained train_view(const KnowledgeBase::Impl& part, const Eigen::Quaterniond& rotation, std::uint64_t seed,
+Trained train_view(const PartFacts& part, const Eigen::Quaterniond& rotation, std::uint64_t seed,
                    DepthRenderer& renderer) {
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
   T.linear() = rotation.toRotationMatrix();
@@ -81,7 +81,7 @@ Trained train_view(const KnowledgeBase::Impl& part, const Eigen::Quaterniond& ro
   return trained;
 }
 
-std::vector<Trained> train_views(const KnowledgeBase::Impl& part, const std::vector<Eigen::Quaterniond>& rotations,
+std::vector<Trained> train_views(const PartFacts& part, const std::vector<Eigen::Quaterniond>& rotations,
                                  std::uint64_t seed, const std::function<void(TrainingProgress)>& progress,
                                  int threads) {
   std::vector<Trained> trained(rotations.size());
@@ -129,43 +129,47 @@ Expected<KnowledgeBase, MeshError> train(const Mesh& mesh, const PartOptions& op
     return std::string{text.data()};
   };
   if (mesh.triangles.empty()) return failed("the mesh holds no triangle; export the part as a surface mesh");
-  auto part = std::make_shared<KnowledgeBase::Impl>(resolved(mesh, options));
-  if (!(part->diameter_mm > 0)) return failed("the mesh has no extent; check mesh_unit");
-  if (part->diameter_mm > kLargestPartMm)
-    return failed("the part's diameter is " + mm(part->diameter_mm) + ", over " + mm(kLargestPartMm) +
+  TrainedPart part;
+  static_cast<PartFacts&>(part) = resolved(mesh, options);
+  if (!(part.diameter_mm > 0)) return failed("the mesh has no extent; check mesh_unit");
+  if (part.diameter_mm > kLargestPartMm)
+    return failed("the part's diameter is " + mm(part.diameter_mm) + ", over " + mm(kLargestPartMm) +
                   "; check mesh_unit");
-  if (!(part->pixel_mm > 0) || part->diameter_mm / part->pixel_mm > 1000)
-    return failed("a pixel of " + mm(part->pixel_mm) + " is too small for a part of " + mm(part->diameter_mm) +
+  if (!(part.pixel_mm > 0) || part.diameter_mm / part.pixel_mm > 1000)
+    return failed("a pixel of " + mm(part.pixel_mm) + " is too small for a part of " + mm(part.diameter_mm) +
                   "; check mesh_unit and pixel_mm");
-  if (part->diameter_mm < 4 * part->pixel_mm)
-    return failed("the part's diameter is " + mm(part->diameter_mm) + ", too small for pixels of " +
-                  mm(part->pixel_mm) + "; check mesh_unit, pixel_mm and scanner");
-  const int asked = options.rotations.value_or(part->scanner == ScannerClass::Lms400 ? 10'000 : 20'000);
-  const auto rotations = training_rotations(std::clamp(asked, 1, kRotationsMax), part->symmetry);
+  if (part.diameter_mm < 4 * part.pixel_mm)
+    return failed("the part's diameter is " + mm(part.diameter_mm) + ", too small for pixels of " + mm(part.pixel_mm) +
+                  "; check mesh_unit, pixel_mm and scanner");
+  const int asked = options.rotations.value_or(part.scanner == ScannerClass::Lms400 ? 10'000 : 20'000);
+  const auto rotations = training_rotations(std::clamp(asked, 1, kRotationsMax), part.symmetry);
   if (threads <= 0) threads = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 64);
-  std::vector<Trained> trained = train_views(*part, rotations, options.seed, progress, threads);
+  std::vector<Trained> trained = train_views(part, rotations, options.seed, progress, threads);
 
   std::vector<std::vector<RawVote>> votes;
   for (Trained& t : trained) {
     // A plate on edge between two columns of pixels shows nothing.
     if (t.view.anchors_object_mm.empty() || t.view.surface.empty()) continue;
-    part->views.push_back(std::move(t.view));
+    part.views.push_back(std::move(t.view));
     votes.push_back(std::move(t.votes));
   }
   trained.clear();
-  if (part->views.empty()) return failed("no view shows anything of the mesh; check mesh_unit and pixel_mm");
+  if (part.views.empty()) return failed("no view shows anything of the mesh; check mesh_unit and pixel_mm");
   VoteTable table = build_votes(
       votes, static_cast<std::uint32_t>(std::max(0, options.votes_per_feature_max.value_or(0))), kVotesPerView);
-  part->offsets = std::move(table.offsets);
-  part->votes = std::move(table.votes);
+  part.offsets = std::move(table.offsets);
+  part.votes = std::move(table.votes);
+  const FileBytes file = kept(encoded(part));
   if (progress) progress({1.0});
   if (summary != nullptr) {
-    summary->symmetry = part->symmetry;
-    summary->rotations = static_cast<int>(part->views.size());
-    summary->votes = part->votes.size();
-    summary->mib = static_cast<double>(knowledge_base_bytes(*part)) / (1 << 20);
+    summary->symmetry = part.symmetry;
+    summary->rotations = static_cast<int>(part.views.size());
+    summary->votes = part.votes.size();
+    summary->mib = static_cast<double>(file.bytes.size()) / (1 << 20);
     summary->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   }
-  return KnowledgeBase(std::move(part));
+  auto base = open_knowledge_base(file, options.name);
+  if (!base) return failed(base.error().text);
+  return std::move(*base);
 }
 }  // namespace binpick::vision

@@ -166,9 +166,9 @@ DepthImage window_around(const Mesh& mesh, const Eigen::Matrix3d& R_supply_objec
   return image;
 }
 
-View view_of(const DepthImage& rendered, const Mesh& mesh, const Eigen::Quaterniond& R_supply_object, double noise_mm,
-             double diameter_mm) {
-  View view;
+TrainedView view_of(const DepthImage& rendered, const Mesh& mesh, const Eigen::Quaterniond& R_supply_object,
+                    double noise_mm, double diameter_mm) {
+  TrainedView view;
   view.R_supply_object = R_supply_object.cast<float>();
   const auto anchors = anchors_of(rendered, noise_mm, diameter_mm);
   if (anchors.empty()) return view;

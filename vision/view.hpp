@@ -21,8 +21,8 @@ DepthImage window_around(const Mesh& mesh, const Eigen::Matrix3d& R_supply_objec
 
 /// What detection wants to know of a rotation, from its rendered depth image without noise.
 /// `depth_mm` is the thickness of the top plateau whose centroid is the first anchor.
-View view_of(const DepthImage& rendered, const Mesh& mesh, const Eigen::Quaterniond& R_supply_object, double noise_mm,
-             double diameter_mm);
+TrainedView view_of(const DepthImage& rendered, const Mesh& mesh, const Eigen::Quaterniond& R_supply_object,
+                    double noise_mm, double diameter_mm);
 /// Thickness of the layer under a maximum that counts as its plateau: noise makes any of its points the highest.
 inline float plateau_mm(double noise_mm, double diameter_mm) {
   return static_cast<float>(2 * noise_mm > 0.02 * diameter_mm ? 2 * noise_mm : 0.02 * diameter_mm);

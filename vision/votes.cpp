@@ -138,7 +138,8 @@ void merge(std::vector<Sighting>& sightings, const LookOptions& options, std::ve
 }
 }  // namespace
 
-std::vector<RawVote> look_at(const std::vector<DepthImage>& renders, const View& view, const LookOptions& options) {
+std::vector<RawVote> look_at(const std::vector<DepthImage>& renders, const TrainedView& view,
+                             const LookOptions& options) {
   std::vector<RawVote> votes;
   if (renders.empty() || view.anchors_object_mm.empty()) return votes;
   const Eigen::Vector3f anchor = view.R_supply_object * view.anchors_object_mm.front();

@@ -27,7 +27,8 @@ struct LookOptions {
 /// Votes of one view for its first anchor. Each look adds noise, a random background (nothing, a floor, clutter beside
 /// the part) and now and then something that lies on it; only features that stay under these are kept.
 /// `renders` are noise-free pictures of the same rotation, their origins at the object's; looks take them in turn.
-std::vector<RawVote> look_at(const std::vector<DepthImage>& renders, const View& view, const LookOptions& options);
+std::vector<RawVote> look_at(const std::vector<DepthImage>& renders, const TrainedView& view,
+                             const LookOptions& options);
 
 struct VoteTable {
   std::vector<std::uint32_t> offsets;

@@ -32,7 +32,7 @@ TEST(View, ABoxLyingFlatIsAsItsFormulaSays) {
   DepthImage image = window_around(box, upright.toRotationMatrix(), 1, 5, {0.5, 0.5});
   make_osmesa_renderer(box)->render(Eigen::Isometry3d::Identity(), image);
   EXPECT_TRUE(std::isnan(image.z_mm(4, 4)));
-  const View view = view_of(image, box, upright, 0.1, box.diameter_mm());
+  const TrainedView view = view_of(image, box, upright, 0.1, box.diameter_mm());
   ASSERT_FALSE(view.anchors_object_mm.empty());
   const Eigen::Vector3f anchor = view.anchors_object_mm.front();  // somewhere on the top: all of it is highest
   EXPECT_NEAR(double{anchor.z()}, 5, 1e-3);
@@ -62,7 +62,7 @@ TEST(View, SamplesLieOnTheSurfaceWithItsNormalsInAnyRotation) {
     Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
     T.linear() = q.toRotationMatrix();
     renderer->render(T, image);
-    const View view = view_of(image, part, q, 0.1, part.diameter_mm());
+    const TrainedView view = view_of(image, part, q, 0.1, part.diameter_mm());
     ASSERT_FALSE(view.anchors_object_mm.empty());
     EXPECT_LE(view.anchors_object_mm.size(), kAnchorsMax);
     const Eigen::Vector3d anchor = q * view.anchors_object_mm.front().cast<double>();
