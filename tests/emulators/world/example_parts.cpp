@@ -12,12 +12,13 @@
 #include "tests/emulators/world/shapes.hpp"
 
 namespace binpick::emulators {
-namespace {
 using Eigen::Vector2f;
 using Eigen::Vector3d;
 using Eigen::Vector3f;
 
+namespace {
 constexpr float kPi = std::numbers::pi_v<float>;
+}  // namespace
 
 ConvexPiece box_piece(const Vector3f& low, const Vector3f& high) {
   ConvexPiece piece;
@@ -26,6 +27,17 @@ ConvexPiece box_piece(const Vector3f& low, const Vector3f& high) {
   return piece;
 }
 
+ConvexPiece cylinder_piece(float radius, float z_low, float z_high, int corners) {
+  ConvexPiece piece;
+  for (int i = 0; i < corners; ++i) {
+    const float angle = 2 * kPi * static_cast<float>(i) / static_cast<float>(corners);
+    for (const float z : {z_low, z_high})
+      piece.points_mm.push_back({radius * std::cos(angle), radius * std::sin(angle), z});
+  }
+  return piece;
+}
+
+namespace {
 /// Prism over a rectangle with cut corners.
 ConvexPiece chamfered_piece(const Vector2f& centre, const Vector2f& half, float chamfer, float z_low, float z_high) {
   ConvexPiece piece;
@@ -41,16 +53,6 @@ ConvexPiece chamfered_piece(const Vector2f& centre, const Vector2f& half, float 
 bool in_chamfered(const Vector2f& p, const Vector2f& centre, const Vector2f& half, float chamfer) {
   const Vector2f d = (p - centre).cwiseAbs();
   return d.x() < half.x() && d.y() < half.y() && d.sum() < half.sum() - chamfer;
-}
-
-ConvexPiece cylinder_piece(float radius, float z_low, float z_high, int corners) {
-  ConvexPiece piece;
-  for (int i = 0; i < corners; ++i) {
-    const float angle = 2 * kPi * static_cast<float>(i) / static_cast<float>(corners);
-    for (const float z : {z_low, z_high})
-      piece.points_mm.push_back({radius * std::cos(angle), radius * std::sin(angle), z});
-  }
-  return piece;
 }
 
 // Directions of approach as rpy_deg: where the tcp's z points in the object frame.

@@ -14,6 +14,10 @@ struct ConvexPiece {
   std::vector<Eigen::Vector3f> points_mm;
 };
 
+ConvexPiece box_piece(const Eigen::Vector3f& low, const Eigen::Vector3f& high);
+/// Prism over a regular polygon, axis z.
+ConvexPiece cylinder_piece(float radius, float z_low, float z_high, int corners);
+
 /// As a PART.toml says it: the tcp's z axis points into the part, the way of approach.
 struct ExampleGrasp {
   std::string name;

@@ -23,7 +23,6 @@ class RayMesh {
   const Eigen::Vector3f& normal(std::uint32_t triangle) const { return triangles_[triangle].normal; }
   const Eigen::AlignedBox3f& box() const { return box_; }
 
- private:
   struct Triangle {
     Eigen::Vector3f corner, edge1, edge2, normal;
   };
@@ -33,6 +32,14 @@ class RayMesh {
     std::uint32_t first = 0;
     std::uint32_t count = 0;
   };
+  /// The tree itself, for those who cast many rays at once (ray_bundle.hpp). Node 0 is the root.
+  struct View {
+    const Node* nodes;
+    const Triangle* triangles;
+  };
+  View view() const { return {nodes_.data(), triangles_.data()}; }
+
+ private:
   std::vector<Triangle> triangles_;
   std::vector<Node> nodes_;
   Eigen::AlignedBox3f box_;

@@ -24,7 +24,7 @@ vision::Mesh cuboid(const Vector3d& low, const Vector3d& high) {
   return shapes::hexahedron(corners);
 }
 
-vision::Mesh surroundings(const Vector3d& size) {
+vision::Mesh supply_and_floor(const Vector3d& size) {
   const double x = size.x() / 2, y = size.y() / 2, z = size.z();
   const double far_x = x + kFloorBeyond_mm, far_y = y + kFloorBeyond_mm;
   vision::Mesh mesh = cuboid({-far_x, -far_y, -kWall_mm}, {far_x, far_y, 0});
@@ -49,7 +49,7 @@ std::optional<float> entry(const Eigen::AlignedBox3f& box, const Vector3f& origi
 
 World::World(const Vector3d& supply_size_mm) : size_mm_{supply_size_mm} {
   surroundings_.part = "supply";
-  surroundings_.mesh = std::make_shared<RayMesh>(surroundings(supply_size_mm));
+  surroundings_.mesh = std::make_shared<RayMesh>(supply_and_floor(supply_size_mm));
   surroundings_.box = surroundings_.mesh->box();
 }
 

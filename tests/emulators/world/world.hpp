@@ -34,6 +34,8 @@ class World {
   bool remove(int id);  ///< False: no such object. Nothing else moves.
   const std::vector<Object>& objects() const { return objects_; }
   const Object* find(int id) const;
+  /// Supply and floor, with id 0.
+  const Object& surroundings() const { return surroundings_; }
 
   struct Hit {
     double distance_mm = 0;

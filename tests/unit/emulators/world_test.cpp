@@ -8,6 +8,7 @@
 
 #include "tests/emulators/world/example_parts.hpp"
 #include "tests/emulators/world/pile.hpp"
+#include "tests/emulators/world/ray_bundle.hpp"
 
 namespace binpick::emulators {
 namespace {
@@ -116,6 +117,40 @@ TEST(Pile, SameSeedSamePileOtherSeedOther) {
   for (std::size_t i = 0; i < 6; ++i) {
     EXPECT_EQ(a.objects()[i].T_supply_object.iso.matrix(), b.objects()[i].T_supply_object.iso.matrix());
     EXPECT_NE(a.objects()[i].T_supply_object.iso.matrix(), c.objects()[i].T_supply_object.iso.matrix());
+  }
+}
+
+TEST(World, ABundleMeetsWhatItsRaysMeetOneByOne) {
+  const World world = make_pile(example_part("gear_shaft"), 12, {500, 400, 300}, 3);
+  std::mt19937 random{5};
+  std::uniform_real_distribution<double> place{-300, 300};
+  for (int bundle = 0; bundle < 40; ++bundle) {
+    const Vector3d origin{place(random), place(random), 900};
+    const Vector3d towards{place(random), place(random), 0};
+    std::vector<Eigen::Vector3f> directions;
+    for (int i = 0; i < 37; ++i) {
+      const Vector3d at = towards + Vector3d{8.0 * i, bundle % 2 == 0 ? 0.0 : place(random), 0};
+      directions.push_back((at - origin).normalized().cast<float>());
+    }
+    std::vector<BundleHit> hits;
+    cast_bundle(world, origin.cast<float>(), directions, 2000, hits);
+    ASSERT_EQ(hits.size(), directions.size());
+    for (std::size_t i = 0; i < hits.size(); ++i) {
+      const Vector3d direction = directions[i].cast<double>();
+      const auto one = world.cast(origin, direction, 2000);
+      ASSERT_EQ(hits[i].met(), one.has_value());
+      // At an edge either neighbour is right.
+      if (one->object != hits[i].object) continue;
+      ASSERT_NEAR(hits[i].distance_mm, one->distance_mm, 0.01);
+      EXPECT_NEAR(std::abs(hits[i].normal.cast<double>().dot(direction)), one->cos_incidence, 1e-3);
+    }
+    const World::Object& object = world.objects()[static_cast<std::size_t>(bundle) % world.objects().size()];
+    cast_bundle(object, origin.cast<float>(), directions, 2000, hits);
+    for (std::size_t i = 0; i < hits.size(); ++i) {
+      EXPECT_TRUE(!hits[i].met() || hits[i].object == object.id);
+      const auto one = world.cast(origin, directions[i].cast<double>(), 2000);
+      EXPECT_TRUE(one->object != object.id || hits[i].met()) << "what is seen in the pile is seen alone";
+    }
   }
 }
 
