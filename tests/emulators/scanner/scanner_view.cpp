@@ -2,47 +2,22 @@
 
 #include <algorithm>
 #include <cmath>
-#include <complex>
 #include <limits>
-#include <numbers>
 #include <optional>
 #include <vector>
+
+#include "tests/emulators/scanner/phase_shift.hpp"
 
 namespace binpick::emulators {
 namespace {
 using Eigen::Vector3d;
-constexpr double kPi = std::numbers::pi;
 constexpr float kNoEcho = std::numeric_limits<float>::quiet_NaN();
 
-/// Distance after which the modulated light is in phase again. Only its ratio to an edge's height shapes mixed points.
-constexpr double kAmbiguity_mm = 4000;
-constexpr double kWhite = 0.9;
 /// Neighbours farther apart than this may have an edge between them.
 constexpr double kEdge_mm = 8;
-/// Light (reflectance · cos incidence) below which every echo is lost, and above which none is.
-constexpr double kLightNone = 0.02, kLightEnough = 0.08;
 /// Echoes are lost for so many neighbours and for so long together.
 constexpr std::size_t kRunPoints = 4;
 constexpr std::int64_t kRun_ns = 8'000'000;
-
-/// SplitMix64 (Steele, Lea, Flood 2014): a small generator that may be started at any place.
-class Random {
- public:
-  explicit Random(std::uint64_t state) : state_{state} {}
-  std::uint64_t next() {
-    std::uint64_t z = (state_ += 0x9E3779B97F4A7C15ULL);
-    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ULL;
-    z = (z ^ (z >> 27)) * 0x94D049BB133111EBULL;
-    return z ^ (z >> 31);
-  }
-  double uniform() { return (static_cast<double>(next() >> 11) + 0.5) * 0x1p-53; }
-  double normal() { return std::sqrt(-2 * std::log(uniform())) * std::cos(2 * kPi * uniform()); }
-
- private:
-  std::uint64_t state_;
-};
-
-std::uint64_t mixed(std::uint64_t a, std::uint64_t b) { return Random{a ^ (b * 0xD1342543DE82EF95ULL)}.next(); }
 
 struct Echo {
   double distance_mm = 0;
@@ -85,22 +60,19 @@ ScanLine ScannerView::operator()(TimePoint middle, Angle first, Angle step, std:
     const double distance = rays[i] ? rays[i]->distance_mm : noise_.range_max_mm;
     const double half_spot = noise_.beam_mm / 2 / distance, half_along = half_spot + 0.25 * step.in_rad();
     const double along = first.in_rad() + static_cast<double>(i) * step.in_rad();
-    std::complex<double> sum;
-    Echo nearest{std::numeric_limits<double>::infinity(), 0, 0};
+    std::vector<LightEcho> spot;
+    int nearest = 0;
+    double nearest_mm = std::numeric_limits<double>::infinity();
     for (int a = -1; a <= 1; ++a) {
       for (int b = -1; b <= 1; ++b) {
         const auto echo = cast(along + a * 2.0 / 3 * half_along, b * 2.0 / 3 * half_spot);
         if (!echo) continue;
-        sum += std::polar(echo->light, 2 * kPi * echo->distance_mm / kAmbiguity_mm);
-        if (echo->distance_mm < nearest.distance_mm) nearest = *echo;
+        spot.push_back({echo->distance_mm, echo->light});
+        if (echo->distance_mm < nearest_mm) nearest_mm = echo->distance_mm, nearest = echo->object;
       }
     }
     echoes[i].reset();
-    if (std::abs(sum) == 0) continue;
-    // The phase is known up to whole turns; the nearest echo tells which.
-    double mixed_mm = std::arg(sum) / (2 * kPi) * kAmbiguity_mm;
-    mixed_mm += kAmbiguity_mm * std::round((nearest.distance_mm - mixed_mm) / kAmbiguity_mm);
-    echoes[i] = Echo{mixed_mm, std::abs(sum) / 9, nearest.object};
+    if (const auto mix = mixed_echo(spot, 9)) echoes[i] = Echo{mix->distance_mm, mix->light, nearest};
   }
 
   const std::int64_t time_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(middle.time_since_epoch()).count();
@@ -114,14 +86,11 @@ ScanLine ScannerView::operator()(TimePoint middle, Angle first, Angle step, std:
     double light = 0;
     if (const auto& echo = echoes[i]) {
       light = echo->light;
-      const double kept = (light - kLightNone) / (kLightEnough - kLightNone);
       Random run{mixed(mixed(noise_.seed, static_cast<std::uint64_t>(time_ns / kRun_ns)), i / kRunPoints)};
-      if (!noise_.dropouts || run.uniform() < kept) {
-        const double sigma = std::min(noise_.sigma_mm * std::sqrt(kWhite / std::max(light, 1e-3)),
-                                      std::max(noise_.sigma_max_mm, noise_.sigma_mm));
+      if (!noise_.dropouts || run.uniform() < echoes_kept(light)) {
+        const double sigma = phase_noise_mm(light, noise_.sigma_mm, noise_.sigma_max_mm);
         const World::Object* object = noise_.bias_mm > 0 ? world_->find(echo->object) : nullptr;
-        const std::uint64_t material = std::hash<std::string>{}(object != nullptr ? object->part : "supply");
-        const double bias = noise_.bias_mm > 0 ? noise_.bias_mm * (2 * Random{material}.uniform() - 1) : 0;
+        const double bias = material_bias_mm(object != nullptr ? object->part : "supply", noise_.bias_mm);
         const double measured = echo->distance_mm + bias + sigma * normal;
         if (measured >= noise_.range_min_mm && measured <= noise_.range_max_mm) range = static_cast<float>(measured);
       }
