@@ -1,0 +1,66 @@
+/// The scene benchmark: how right, how sure, how accurate and how fast detection is on simulated piles.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+
+#include "bench/scenes/run.hpp"
+#include "bench/scenes/table.hpp"
+
+namespace {
+using namespace binpick::bench;
+
+/// "a:b" → [a, b).
+void set_range(RunSelection& selection, const std::string& text) {
+  const auto colon = text.find(':');
+  if (colon == std::string::npos) throw CLI::ValidationError{"--scenes", "wants FROM:TO"};
+  selection.from = std::stoul(text.substr(0, colon));
+  selection.to = std::stoul(text.substr(colon + 1));
+}
+
+void set_shard(RunSelection& selection, const std::string& text) {
+  const auto slash = text.find('/');
+  if (slash == std::string::npos) throw CLI::ValidationError{"--shard", "wants I/N"};
+  selection.shard = std::stoul(text.substr(0, slash));
+  selection.shards = std::stoul(text.substr(slash + 1));
+  if (selection.shard >= selection.shards) throw CLI::ValidationError{"--shard", "wants I/N with I from 0 to N - 1"};
+}
+
+void add_run_options(CLI::App& command, RunOptions& options) {
+  command.add_option("--out", options.out, "folder of the run; what it has already is not run again")->required();
+  command.add_option("--piles", options.piles, "folder of settled piles");
+  command.add_option("--bases", options.bases, "folder of knowledge bases (default: OUT/bases)");
+  command.add_option("--threads", options.threads, "threads of detection");
+  command.add_option("--hypotheses", options.hypotheses_max, "bound of the hypotheses");
+  command.add_option("--bias-mm", options.bias_mm, "LMS 400: bias of each material, within plus and minus this");
+  command.add_option("--ablate", options.without, "leave this addition out; may be given several times");
+}
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"Detection on simulated piles"};
+  app.require_subcommand(1);
+  RunOptions options;
+  RunSelection selection;
+  std::string folder;
+
+  CLI::App* run_command = app.add_subcommand("run", "detect in scenes, write one line for each");
+  add_run_options(*run_command, options);
+  run_command->add_option("--class", selection.classes, "lps36hi, lps36, lms400 (default: all)");
+  run_command->add_option("--part", selection.parts, "parts (default: all of the class)");
+  run_command->add_option("--split", selection.split, "tune or report");
+  run_command->add_option_function<std::string>(
+      "--scenes", [&](const std::string& text) { set_range(selection, text); }, "FROM:TO, numbers in the split");
+  run_command->add_option_function<std::string>(
+      "--shard", [&](const std::string& text) { set_shard(selection, text); }, "I/N: every N-th scene, from the I-th");
+  CLI::App* table_command = app.add_subcommand("table", "print the figures of a run");
+  table_command->add_option("folder", folder, "of the run")->required();
+  CLI11_PARSE(app, argc, argv);
+  try {
+    if (*run_command) run(options, selection);
+    if (*table_command) print_table(folder);
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "bench_scenes: %s\n", e.what());
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <vector>
+
+#include "bench/scenes/parts.hpp"
+#include "bench/scenes/scanners.hpp"
+
+namespace binpick::bench {
+/// What there is to be found of one object.
+struct Truth {
+  Transform<frame::Supply, frame::Object> T_supply_object;
+  /// Points that the ideal scanner measures on it in the scene, over those it would measure on it alone, without supply
+  /// and neighbours: what lies in the shadow of a wall counts as hidden.
+  double visible = 0;
+  /// The ideal scanner measures enough of what tells near-symmetric poses apart (ScenePart::tells). Else such poses are
+  /// one and the same to any method, and each of them is right.
+  bool told = true;
+};
+
+/// In the order of the world's objects.
+std::vector<Truth> truths_of(const ScenePart& part, const ClassSetting& setting, const std::vector<Profile>& lines,
+                             const std::vector<std::vector<Echo>>& ideal, const emulators::World& world);
+}  // namespace binpick::bench
