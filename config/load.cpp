@@ -105,6 +105,7 @@ std::vector<Diagnostic> read_part(Document document, Part& part) {
       const Places places = read_section(*table, symmetry_section(), entry, context);
       vision::Symmetry symmetry;
       if (make_symmetry(entry, places, findings, symmetry)) part.options.symmetry = symmetry;
+      if (places.given("centre_mm")) part.options.symmetry_centre_mm = entry.centre_mm;
     }
   auto all = std::move(document.findings);
   for (auto& finding : findings.take()) all.push_back(std::move(finding));

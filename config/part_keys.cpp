@@ -78,8 +78,9 @@ const Section<SymmetryEntry>& symmetry_section() {
             .help = "Of dihedral; at right angles to axis."},
            [](S& s) -> Slot { return &s.flip_axis; }},
           {{.name = "centre_mm", .type = Vector, .unit = "mm", .min = -10000, .max = 10000,
-            .default_value = "[0, 0, 0]",
-            .help = "A point that all these turns leave where it is."},
+            .sample = "[0, 0, 12.5]",
+            .help = "A point that all these turns leave where it is. Default: the centroid of the mesh's surface; another "
+                    "one only helps a part that is not quite symmetric."},
            [](S& s) -> Slot { return &s.centre_mm; }},
       }};
   return section;

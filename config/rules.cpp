@@ -144,7 +144,6 @@ bool make_symmetry(const SymmetryEntry& entry, const Places& places, Findings& f
   }
   const Eigen::Vector3d axis = entry.axis.normalized();
   symmetry = {};
-  symmetry.centre_mm = entry.centre_mm;
   symmetry.axis = axis;
   switch (entry.kind) {
     case kNone:

@@ -31,7 +31,8 @@ struct PartOptions {
   std::optional<ScannerClass> scanner;  ///< Default: Lps36 under 150 mm diameter, else Lms400.
   std::optional<double> pixel_mm;
   std::optional<int> rotations;      ///< Training rotations before the symmetry reduces them.
-  std::optional<Symmetry> symmetry;  ///< Default: found from the mesh.
+  std::optional<Symmetry> symmetry;  ///< Default: found from the mesh. Its centre comes from the next option.
+  std::optional<Eigen::Vector3d> symmetry_centre_mm;  ///< Default: the surface centroid, which no symmetry moves.
   std::optional<double> symmetry_tolerance_mm;
   std::optional<int> votes_per_feature_max;
   std::uint64_t seed = 1;
@@ -82,6 +83,9 @@ class KnowledgeBase {
  private:
   std::shared_ptr<const Impl> impl_;
 };
+
+/// The symmetry that the options give, completed, or the one found from the mesh.
+Symmetry symmetry_of(const Mesh& mesh, const PartOptions& options);
 
 /// Renders the mesh in every training rotation and stores votes (docs/vision.md, training).
 /// Deterministic for the same mesh and options. `progress` may be empty.

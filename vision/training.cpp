@@ -31,22 +31,25 @@ double default_pixel_mm(const Mesh& mesh, const ScannerFigures& figures, double 
   return std::max(pixel, diameter_mm / 120);  // A vote reaches 127 pixels.
 }
 
+ScannerClass scanner_of(const PartOptions& options, double diameter_mm) {
+  return options.scanner.value_or(diameter_mm < kSmallPartMm ? ScannerClass::Lps36 : ScannerClass::Lms400);
+}
+
 /// What resolve() made of the options and the mesh; the votes are still to come.
 PartFacts resolved(const Mesh& mesh, const PartOptions& options) {
   PartFacts part;
   part.part_name = options.name;
-  part.mesh = mesh;
   part.mesh_hash = mesh_hash(mesh);
   part.diameter_mm = mesh.diameter_mm();
-  part.scanner = options.scanner.value_or(part.diameter_mm < kSmallPartMm ? ScannerClass::Lps36 : ScannerClass::Lms400);
+  part.scanner = scanner_of(options, part.diameter_mm);
   const ScannerFigures& figures = figures_of(part.scanner);
   part.noise_mm = figures.noise_mm;
-  part.pixel_mm = options.pixel_mm.value_or(default_pixel_mm(mesh, figures, part.diameter_mm));
+  part.mesh = mesh;
+  part.pixel_mm = options.pixel_mm.value_or(default_pixel_mm(part.mesh, figures, part.diameter_mm));
   part.dz_quantum_mm = std::max(0.25 * part.noise_mm, part.diameter_mm / 30'000);
-  // What the scanner's noise hides is no difference.
-  const double tolerance =
-      options.symmetry_tolerance_mm.value_or(std::max(0.5 * part.noise_mm, 0.005 * part.diameter_mm));
-  part.symmetry = options.symmetry ? *options.symmetry : find_symmetry(mesh, tolerance);
+  PartOptions known = options;
+  known.scanner = part.scanner;
+  part.symmetry = symmetry_of(part.mesh, known);
   part.feature_stride = std::clamp(static_cast<int>(std::lround(0.04 * part.diameter_mm / part.pixel_mm)), 1, 4);
   part.feature_tolerance_mm =
       static_cast<float>(std::max(1.6 * part.noise_mm, 0.25 * part.pixel_mm * part.feature_stride));
@@ -114,6 +117,18 @@ const ScannerFigures& figures_of(ScannerClass scanner) {
       return kLms400;
   }
   return kLps36;
+}
+
+Symmetry symmetry_of(const Mesh& mesh, const PartOptions& options) {
+  if (options.symmetry) {
+    Symmetry given = *options.symmetry;
+    given.centre_mm = options.symmetry_centre_mm.value_or(mesh.centroid_mm());
+    return given;
+  }
+  // What the scanner's noise hides is no difference.
+  const double diameter_mm = mesh.diameter_mm();
+  const double noise_mm = figures_of(scanner_of(options, diameter_mm)).noise_mm;
+  return find_symmetry(mesh, options.symmetry_tolerance_mm.value_or(std::max(0.5 * noise_mm, 0.005 * diameter_mm)));
 }
 
 Expected<KnowledgeBase, MeshError> train(const Mesh& mesh, const PartOptions& options,

@@ -19,7 +19,6 @@ namespace {
 constexpr double kGripMm = 15;
 constexpr double kGripRad = 10 * std::numbers::pi / 180;
 /// Symmetry is taken from the mesh when there is no knowledge base to ask.
-constexpr double kSymmetryToleranceMm = 1.5;
 
 /// A body for the physics of a part that is not ours: the hull of its mesh, by its outermost points in many directions.
 ConvexPiece hull_of(const vision::Mesh& mesh) {
@@ -57,8 +56,7 @@ vision::Mesh mesh_of(const config::Part& part) {
 
 vision::Symmetry symmetry_of(const config::Recipe& recipe, const vision::Mesh& mesh) {
   if (const auto knowledge = vision::KnowledgeBase::open(recipe.knowledge_base)) return knowledge->symmetry();
-  if (recipe.part.options.symmetry) return *recipe.part.options.symmetry;
-  return vision::find_symmetry(mesh, recipe.part.options.symmetry_tolerance_mm.value_or(kSymmetryToleranceMm));
+  return vision::symmetry_of(mesh, recipe.part.options);
 }
 }  // namespace
 

@@ -288,7 +288,12 @@ TEST(Part, SymmetryIsMadeFromItsKind) {
   using Kind = vision::Symmetry::Kind;
   EXPECT_EQ(symmetry("kind = \"none\"").kind, Kind::None);
   EXPECT_EQ(symmetry("kind = \"revolution\"\naxis = [0, 1, 0]").axis, Eigen::Vector3d::UnitY());
-  EXPECT_EQ(symmetry("kind = \"sphere\"\ncentre_mm = [1, 2, 3]").centre_mm, Eigen::Vector3d(1, 2, 3));
+  const auto centre = [&](const std::string& keys) {
+    return load_part_text(folder.path("p.toml"), "mesh = \"track_link.stl\"\n[symmetry]\nkind = \"sphere\"\n" + keys)
+        ->options.symmetry_centre_mm;
+  };
+  EXPECT_EQ(centre("centre_mm = [1, 2, 3]"), Eigen::Vector3d(1, 2, 3));
+  EXPECT_FALSE(centre("").has_value());
   const auto cyclic = symmetry("kind = \"cyclic\"\nfold = 3");
   EXPECT_EQ(cyclic.kind, Kind::Finite);
   ASSERT_EQ(cyclic.rotations.size(), 3U);

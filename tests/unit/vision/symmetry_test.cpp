@@ -6,6 +6,7 @@
 #include <random>
 
 #include "tests/unit/vision/shapes.hpp"
+#include "vision/knowledge_base.hpp"
 #include "vision/surface.hpp"
 
 namespace binpick::vision {
@@ -47,6 +48,27 @@ Mesh star(int points, float outer, float inner, float h) {
     corners.emplace_back(r * static_cast<float>(std::cos(a)), r * static_cast<float>(std::sin(a)));
   }
   return prism(corners, h);
+}
+
+/// Arms askew on a disc that closes one end: turns by 360 / arms degrees and nothing else.
+Mesh propeller(int arms) {
+  std::vector<Eigen::Vector2f> corners;
+  for (int i = 0; i < 4 * arms; ++i) {
+    static constexpr float kRadius[] = {12, 12, 40, 24};
+    const double a = 2 * kPi * i / (4 * arms);
+    corners.emplace_back(kRadius[i % 4] * static_cast<float>(std::cos(a)),
+                         kRadius[i % 4] * static_cast<float>(std::sin(a)));
+  }
+  Mesh mesh = prism(corners, 12);
+  shapes::add(mesh, shapes::cylinder(20, 15, 60), {0, 0, 13.5F});
+  return mesh;
+}
+
+Mesh octahedron(float s) {
+  Mesh mesh;
+  mesh.vertices_mm = {{s, 0, 0}, {-s, 0, 0}, {0, s, 0}, {0, -s, 0}, {0, 0, s}, {0, 0, -s}};
+  mesh.triangles = {{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4}, {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}};
+  return mesh;
 }
 
 Mesh tetrahedron(float s) {
@@ -109,27 +131,75 @@ TEST_P(KnownSymmetry, IsFoundInAnyPose) {
 
 INSTANTIATE_TEST_SUITE_P(
     Solids, KnownSymmetry,
-    testing::Values(Known{"box", shapes::box(60, 40, 20), Kind::Finite, 4},
-                    Known{"square_bar", shapes::box(20, 20, 70), Kind::Finite, 8},
-                    Known{"cube", shapes::box(40, 40, 40), Kind::Finite, 24},
-                    Known{"tetrahedron", tetrahedron(30), Kind::Finite, 12},
-                    Known{"l_shape", shapes::l_shape(), Kind::None, 1},
-                    Known{"cylinder", shapes::cylinder(20, 90), Kind::RevolutionFlip, 1},
-                    Known{"ball_like_cylinder", shapes::cylinder(30, 51.9615F), Kind::RevolutionFlip, 1},
-                    Known{"cone", shapes::turned({{0, 30.0F}, {60, 5.0F}}, 64), Kind::Revolution, 1},
-                    Known{"sphere", shapes::sphere(30), Kind::Sphere, 1},
-                    Known{"hex_prism", star(3, 30, 30, 20), Kind::Finite, 12},
-                    Known{"star_of_five", star(5, 40, 20, 15), Kind::Finite, 10},
-                    Known{"star_of_twelve", star(12, 50, 38, 15), Kind::Finite, 24},
-                    Known{"gear_of_24", star(24, 50, 40, 15), Kind::Finite, 48},
-                    Known{"hex_pyramid", shapes::turned({{0, 30.0F}, {50, 6.0F}}, 6), Kind::Finite, 6},
-                    Known{"keyway_shaft", keyway_shaft(6), Kind::Finite, 2}),
+    testing::Values(
+        Known{"box", shapes::box(60, 40, 20), Kind::Finite, 4},
+        Known{"square_bar", shapes::box(20, 20, 70), Kind::Finite, 8},
+        Known{"cube", shapes::box(40, 40, 40), Kind::Finite, 24},
+        Known{"tetrahedron", tetrahedron(30), Kind::Finite, 12}, Known{"l_shape", shapes::l_shape(), Kind::None, 1},
+        Known{"cylinder", shapes::cylinder(20, 90), Kind::RevolutionFlip, 1},
+        Known{"ball_like_cylinder", shapes::cylinder(30, 51.9615F), Kind::RevolutionFlip, 1},
+        Known{"cone", shapes::turned({{0, 30.0F}, {60, 5.0F}}, 64), Kind::Revolution, 1},
+        Known{"sphere", shapes::sphere(30), Kind::Sphere, 1}, Known{"hex_prism", star(3, 30, 30, 20), Kind::Finite, 12},
+        Known{"star_of_five", star(5, 40, 20, 15), Kind::Finite, 10},
+        Known{"star_of_twelve", star(12, 50, 38, 15), Kind::Finite, 24},
+        Known{"gear_of_24", star(24, 50, 40, 15), Kind::Finite, 48},
+        Known{"hex_pyramid", shapes::turned({{0, 30.0F}, {50, 6.0F}}, 6), Kind::Finite, 6},
+        Known{"two_armed_propeller", propeller(2), Kind::Finite, 2},
+        Known{"three_armed_propeller", propeller(3), Kind::Finite, 3},
+        Known{"square_frustum", shapes::turned({{0, 30.0F}, {40, 12.0F}}, 4), Kind::Finite, 4},
+        Known{"octahedron", octahedron(30), Kind::Finite, 24}, Known{"keyway_shaft", keyway_shaft(6), Kind::Finite, 2}),
     [](const auto& parameter) { return std::string(parameter.param.name); });
 
 TEST(Symmetry, ToleranceSaysWhatIsNear) {
   EXPECT_EQ(find_symmetry(keyway_shaft(6), 3).kind, Kind::RevolutionFlip);
   EXPECT_EQ(find_symmetry(shapes::box(60, 40, 38), 0.2).rotations.size(), 4U);
   EXPECT_EQ(find_symmetry(shapes::box(60, 40, 38), 2.5).rotations.size(), 8U);
+}
+
+TEST(Symmetry, AKeywayIsSeenWithAFineScannerAndHiddenByTheNoiseOfACoarseOne) {
+  PartOptions options;
+  options.scanner = ScannerClass::Lps36Hi;
+  EXPECT_EQ(symmetry_of(keyway_shaft(3), options).kind, Kind::Finite);
+  options.scanner = ScannerClass::Lms400;
+  EXPECT_EQ(symmetry_of(keyway_shaft(3), options).kind, Kind::RevolutionFlip);
+}
+
+TEST(Symmetry, AGivenKindAndAxisMeanTheSameAsWhatIsFound) {
+  // The mesh's origin lies far from the part, so that a centre of (0, 0, 0) would mean another symmetry.
+  std::mt19937_64 random(21);
+  const Eigen::Isometry3d T = random_pose(random, 200);
+  const Eigen::Vector3d axis = T.linear().col(2);
+  struct Case {
+    Mesh mesh;
+    Kind kind;
+  };
+  for (const Case& c :
+       {Case{shapes::cylinder(20, 90), Kind::RevolutionFlip},
+        Case{shapes::turned({{0, 30.0F}, {60, 5.0F}}, 64), Kind::Revolution}, Case{shapes::sphere(30), Kind::Sphere}}) {
+    const Mesh mesh = shapes::moved(c.mesh, T);
+    const Symmetry found = symmetry_of(mesh, {});
+    PartOptions options;
+    options.symmetry.emplace();
+    options.symmetry->kind = c.kind;
+    options.symmetry->axis = -axis;
+    const Symmetry given = symmetry_of(mesh, options);
+    ASSERT_EQ(found.kind, given.kind);
+    for (int i = 0; i < 20; ++i) {
+      // Beside each other: a pose, and one that only the symmetry makes nearly equal.
+      const Eigen::Isometry3d P = random_pose(random, 50);
+      Eigen::Isometry3d Q = P;
+      Q.translate(found.centre_mm);
+      Q.rotate(Eigen::AngleAxisd(0.3 * i, axis));
+      if (c.kind == Kind::RevolutionFlip) Q.rotate(Eigen::AngleAxisd(kPi, axis.unitOrthogonal()));
+      Q.translate(-found.centre_mm);
+      for (const Symmetry& s : {found, given}) {
+        EXPECT_LT(pose_distance(P, Q, s, 30).centroid_mm, 1e-3);
+        EXPECT_LT(pose_distance(P, Q, s, 30).angle_rad, 1e-3);
+      }
+    }
+    options.symmetry_centre_mm = Eigen::Vector3d(1, 2, 3);
+    EXPECT_EQ(symmetry_of(mesh, options).centre_mm, Eigen::Vector3d(1, 2, 3));
+  }
 }
 
 TEST(Symmetry, FlippedNormalsChangeNothing) {
