@@ -83,10 +83,11 @@ int run(const TrainOrder& order) {
   bar.clear();
   if (!base) return failed(2, base.error().text);
   if (const auto saved = base->save(order.output); !saved) return failed(1, saved.error().text);
-  std::printf(
-      "%s: %s\n  symmetry   %s\n  rotations  %d\n  votes      %llu\n  size       %.1f MiB\n  time       %.1f s\n",
-      base->part_name().c_str(), order.output.c_str(), to_string(summary.symmetry).c_str(), summary.rotations,
-      static_cast<unsigned long long>(summary.votes), summary.mib, summary.seconds);
+  std::printf("%s: %s\n  mesh       %zu triangles, %zu rendered\n", base->part_name().c_str(), order.output.c_str(),
+              summary.triangles, summary.triangles_rendered);
+  std::printf("  symmetry   %s\n  rotations  %d\n  votes      %llu\n  size       %.1f MiB\n  time       %.1f s\n",
+              to_string(summary.symmetry).c_str(), summary.rotations, static_cast<unsigned long long>(summary.votes),
+              summary.mib, summary.seconds);
   return 0;
 }
 }  // namespace

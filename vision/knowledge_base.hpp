@@ -43,6 +43,8 @@ struct TrainingProgress {
 };
 struct TrainingSummary {
   Symmetry symmetry;
+  std::size_t triangles = 0;           ///< Of the mesh.
+  std::size_t triangles_rendered = 0;  ///< Of the simpler one that stands for it.
   int rotations = 0;
   std::uint64_t votes = 0;
   double mib = 0;

@@ -15,9 +15,10 @@ Corners corners_of(const Mesh& mesh, std::size_t triangle) {
 }
 
 double area_of(const Corners& v) { return 0.5 * (v[1] - v[0]).cross(v[2] - v[0]).norm(); }
+}  // namespace
 
 /// Ericson, Real-Time Collision Detection (2004), 5.1.5: by the region of the plane that the point falls into.
-double squared_distance(const Eigen::Vector3d& p, const Corners& v) {
+double squared_distance(const Eigen::Vector3d& p, const std::array<Eigen::Vector3d, 3>& v) {
   const Eigen::Vector3d ab = v[1] - v[0], ac = v[2] - v[0], ap = p - v[0];
   const double d1 = ab.dot(ap), d2 = ac.dot(ap);
   if (d1 <= 0 && d2 <= 0) return ap.squaredNorm();
@@ -37,7 +38,6 @@ double squared_distance(const Eigen::Vector3d& p, const Corners& v) {
   const double scale = 1 / (va + vb + vc);
   return (ap - vb * scale * ab - vc * scale * ac).squaredNorm();
 }
-}  // namespace
 
 SurfaceTree::SurfaceTree(const Mesh& mesh) {
   std::vector<int> order(mesh.triangles.size());

@@ -2,11 +2,15 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <array>
 #include <vector>
 
 #include "vision/mesh.hpp"
 
 namespace binpick::vision {
+/// Of a point from a triangle, mm².
+double squared_distance(const Eigen::Vector3d& p_mm, const std::array<Eigen::Vector3d, 3>& corners_mm);
+
 /// A mesh that answers how far a point lies from its surface: a tree of boxes over the triangles.
 class SurfaceTree {
  public:
