@@ -1,76 +1,79 @@
 #include "vision/feature.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
 
 namespace binpick::vision {
 namespace {
-std::uint32_t feature_at_border(const DepthImage& image, const FeatureRule& rule, int row, int col) {
-  const auto rows = static_cast<int>(image.z_mm.rows()), cols = static_cast<int>(image.z_mm.cols());
-  const float centre = image.z_mm(row, col);
-  std::uint32_t feature = 0;
-  int missing = 0;
-  for (std::size_t i = 0; i < kRing.size(); ++i) {
-    const int r = row + kRing[i].dy * rule.stride, c = col + kRing[i].dx * rule.stride;
-    const bool inside = r >= 0 && r < rows && c >= 0 && c < cols;
-    const float z = inside ? image.z_mm(r, c) : std::numeric_limits<float>::quiet_NaN();
-    missing += std::isnan(z) ? 1 : 0;
-    feature += kDigit[i] * digit_of(centre, z, rule.tolerance_mm);
-  }
-  return missing > kMissingMax ? kNoFeature : feature;
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+using Heights = Eigen::Array<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+/// The image with `border` missing pixels around it: no pixel is a special case then, and the compiler can take several
+/// at once.
+Heights framed(const DepthImage& image, int border) {
+  Heights frame = Heights::Constant(image.z_mm.rows() + 2 * border, image.z_mm.cols() + 2 * border, kNan);
+  frame.block(border, border, image.z_mm.rows(), image.z_mm.cols()) = image.z_mm;
+  return frame;
 }
 }  // namespace
 
 std::vector<std::uint32_t> features_of(const DepthImage& image, const FeatureRule& rule) {
-  const auto rows = static_cast<int>(image.z_mm.rows()), cols = static_cast<int>(image.z_mm.cols());
+  const auto rows = static_cast<std::ptrdiff_t>(image.z_mm.rows()),
+             cols = static_cast<std::ptrdiff_t>(image.z_mm.cols());
   const int reach = kRingReach * rule.stride;
-  std::vector<std::uint32_t> features(static_cast<std::size_t>(rows) * static_cast<std::size_t>(cols), kNoFeature);
-  std::array<std::ptrdiff_t, kRing.size()> steps{};
-  for (std::size_t i = 0; i < kRing.size(); ++i)
-    steps[i] = (std::ptrdiff_t{kRing[i].dy} * cols + kRing[i].dx) * rule.stride;
-  for (int row = 0; row < rows; ++row) {
-    const float* z = image.z_mm.data() + std::ptrdiff_t{row} * cols;
-    std::uint32_t* out = features.data() + std::ptrdiff_t{row} * cols;
-    const bool inner_row = row >= reach && row < rows - reach;
-    for (int col = 0; col < cols; ++col) {
-      if (std::isnan(z[col])) continue;
-      if (!inner_row || col < reach || col >= cols - reach) {
-        out[col] = feature_at_border(image, rule, row, col);
-        continue;
+  const Heights frame = framed(image, reach);
+  const float tolerance = rule.tolerance_mm;
+  std::vector<std::uint32_t> features(static_cast<std::size_t>(rows * cols), 0);
+  std::vector<std::uint32_t> missing(static_cast<std::size_t>(cols));
+  for (std::ptrdiff_t row = 0; row < rows; ++row) {
+    const float* centre = frame.data() + (row + reach) * frame.cols() + reach;
+    std::uint32_t* out = features.data() + row * cols;
+    std::uint32_t* gone = missing.data();
+    std::fill(missing.begin(), missing.end(), 0U);
+    for (std::size_t i = 0; i < kRing.size(); ++i) {
+      const float* neighbour = centre + (std::ptrdiff_t{kRing[i].dy} * frame.cols() + kRing[i].dx) * rule.stride;
+      const std::uint32_t weight = kDigit[i];
+      for (std::ptrdiff_t col = 0; col < cols; ++col) {
+        const float d = neighbour[col] - centre[col];
+        // digit_of() without a branch.
+        const std::uint32_t higher = d > tolerance ? kHigher : 0U, lower = d >= -tolerance ? 0U : kLower;
+        out[col] += weight * (higher + lower);
+        gone[col] += std::isnan(neighbour[col]) ? 1U : 0U;
       }
-      const float centre = z[col];
-      std::uint32_t feature = 0;
-      int missing = 0;
-      for (std::size_t i = 0; i < kRing.size(); ++i) {
-        const float neighbour = z[col + steps[i]];
-        missing += neighbour != neighbour ? 1 : 0;
-        feature += kDigit[i] * digit_of(centre, neighbour, rule.tolerance_mm);
-      }
-      if (missing <= kMissingMax) out[col] = feature;
     }
+    for (std::ptrdiff_t col = 0; col < cols; ++col)
+      if (std::isnan(centre[col]) || gone[col] > kMissingMax) out[col] = kNoFeature;
   }
   return features;
 }
 
 DepthImage smoothed(const DepthImage& image, float jump_mm) {
   DepthImage out = image;
-  const auto rows = static_cast<int>(image.z_mm.rows()), cols = static_cast<int>(image.z_mm.cols());
-  for (int row = 0; row < rows; ++row)
-    for (int col = 0; col < cols; ++col) {
-      const float centre = image.z_mm(row, col);
-      if (std::isnan(centre)) continue;
-      float sum = 0;
-      int count = 0;
-      for (int r = row > 0 ? row - 1 : 0; r <= row + 1 && r < rows; ++r)
-        for (int c = col > 0 ? col - 1 : 0; c <= col + 1 && c < cols; ++c) {
-          const float d = image.z_mm(r, c) - centre;
-          if (!(std::abs(d) <= jump_mm)) continue;
-          sum += d;
-          ++count;
+  const Heights frame = framed(image, 1);
+  const auto rows = static_cast<std::ptrdiff_t>(image.z_mm.rows()),
+             cols = static_cast<std::ptrdiff_t>(image.z_mm.cols());
+  std::vector<float> sums(static_cast<std::size_t>(cols)), counts(static_cast<std::size_t>(cols));
+  for (std::ptrdiff_t row = 0; row < rows; ++row) {
+    const float* centre = frame.data() + (row + 1) * frame.cols() + 1;
+    float *sum = sums.data(), *count = counts.data();
+    std::fill(sums.begin(), sums.end(), 0.0F);
+    std::fill(counts.begin(), counts.end(), 0.0F);
+    for (std::ptrdiff_t dy = -1; dy <= 1; ++dy)
+      for (std::ptrdiff_t dx = -1; dx <= 1; ++dx) {
+        const float* neighbour = centre + dy * frame.cols() + dx;
+        for (std::ptrdiff_t col = 0; col < cols; ++col) {
+          const float d = neighbour[col] - centre[col];
+          const bool near = std::abs(d) <= jump_mm;
+          sum[col] += near ? d : 0.0F;
+          count[col] += near ? 1.0F : 0.0F;
         }
-      out.z_mm(row, col) = centre + sum / static_cast<float>(count);
-    }
+      }
+    float* to = out.z_mm.data() + row * cols;
+    // A missing pixel has no near neighbour, not even itself; 0 / 0 keeps it missing.
+    for (std::ptrdiff_t col = 0; col < cols; ++col) to[col] = centre[col] + sum[col] / count[col];
+  }
   return out;
 }
 }  // namespace binpick::vision
