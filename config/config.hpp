@@ -34,7 +34,6 @@ struct Part {
   std::string path;       ///< Of the PART.toml.
   std::string mesh_path;  ///< Resolved against the PART.toml's folder.
   double mesh_unit_mm = 1;
-  bool conveyor = false;
   vision::PartOptions options;
   std::vector<vision::Grasp> grasps;
 };

@@ -30,9 +30,10 @@ const Section<Part>& part_section() {
                            [] { return std::size_t{0}; }};
            }},
           {{.name = "picking", .type = Choice, .default_value = "\"bin\"", .choices = {"bin", "conveyor"},
-            .help = "bin: the part lies in any rotation; conveyor: in its stable poses only."},
+            .help = "bin: the part lies in any rotation; conveyor: each alone, as it rests on a belt."},
            [](P& p) -> Slot {
-             return Chosen{[&p](std::size_t i) { p.conveyor = i == 1; }, [&p] { return std::size_t{p.conveyor}; }};
+             return Chosen{[&p](std::size_t i) { p.options.picking = static_cast<vision::Picking>(i); },
+                           [&p] { return static_cast<std::size_t>(p.options.picking); }};
            }},
           {{.name = "pixel_mm", .type = Number, .unit = "mm", .min = 0.05, .max = 50, .sample = "2",
             .help = "Edge of a pixel of the depth image. Default: from the mesh and the scanner."},

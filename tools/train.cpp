@@ -85,6 +85,7 @@ int run(const TrainOrder& order) {
   if (const auto saved = base->save(order.output); !saved) return failed(1, saved.error().text);
   std::printf("%s: %s\n  mesh       %zu triangles, %zu rendered\n", base->part_name().c_str(), order.output.c_str(),
               summary.triangles, summary.triangles_rendered);
+  if (summary.resting_poses > 0) std::printf("  resting    %zu poses\n", summary.resting_poses);
   std::printf("  symmetry   %s\n  rotations  %d\n  votes      %llu\n  size       %.1f MiB\n  time       %.1f s\n",
               to_string(summary.symmetry).c_str(), summary.rotations, static_cast<unsigned long long>(summary.votes),
               summary.mib, summary.seconds);

@@ -32,7 +32,7 @@ constexpr double kSparseToleranceDiameters = 0.035;
 /// A rotation of a grid of 10 000 is up to nine degrees off, which moves the lowest point against the highest by so
 /// much: a narrower gate silently loses what lies flat on the floor.
 constexpr double kFloorGateDiameters = 0.12;
-constexpr double kUsualRotations = 10'000;
+constexpr double kUsualGapRad = 0.0988;  ///< Of a grid of 10 000, on average.
 constexpr double kWallGateDiameters = 0.04;
 constexpr double kSameDiameters = 0.12;
 /// Below this a hypothesis is no detection.
@@ -143,14 +143,8 @@ class Detecting {
     observed({stage, {}, poses});
   }
 
-  /// How far apart the training rotations are, against the usual grid: a rotation's error goes with the cube root of
-  /// their number.
-  double coarseness() const {
-    const bool finite = part_.symmetry.kind == Symmetry::Kind::None || part_.symmetry.kind == Symmetry::Kind::Finite;
-    if (!finite || part_.views.empty()) return 1;
-    const double order = std::max<double>(1, static_cast<double>(part_.symmetry.rotations.size()));
-    return std::clamp(std::cbrt(kUsualRotations / (order * static_cast<double>(part_.views.size()))), 0.8, 2.0);
-  }
+  /// How far apart the training rotations are, against the usual grid.
+  double coarseness() const { return std::clamp(part_.rotation_gap_rad / kUsualGapRad, 0.8, 2.0); }
 
   std::vector<Eigen::Vector3f> anchors() const {
     MaximaOptions maxima;

@@ -25,10 +25,14 @@ struct ScannerFigures {
 };
 const ScannerFigures& figures_of(ScannerClass scanner);
 
+/// How objects lie: in any rotation, or each by itself in one of its resting poses.
+enum class Picking { Bin, Conveyor };
+
 /// What a PART.toml says; an absent value has a default derived from the mesh (see resolve in training).
 struct PartOptions {
   std::string name;
   std::optional<ScannerClass> scanner;  ///< Default: Lps36 under 150 mm diameter, else Lms400.
+  Picking picking = Picking::Bin;
   std::optional<double> pixel_mm;
   std::optional<int> rotations;      ///< Training rotations before the symmetry reduces them.
   std::optional<Symmetry> symmetry;  ///< Default: found from the mesh. Its centre comes from the next option.
@@ -45,6 +49,7 @@ struct TrainingSummary {
   Symmetry symmetry;
   std::size_t triangles = 0;           ///< Of the mesh.
   std::size_t triangles_rendered = 0;  ///< Of the simpler one that stands for it.
+  std::size_t resting_poses = 0;       ///< Of a part on a conveyor.
   int rotations = 0;
   std::uint64_t votes = 0;
   double mib = 0;

@@ -23,10 +23,11 @@ struct FactsRecord {
   std::int32_t feature_stride;
   float feature_tolerance_mm;
   std::array<double, 4> pixel_noise_diameter_quantum_mm;
+  double rotation_gap_rad;
   std::array<double, 3> symmetry_centre_mm, symmetry_axis;
   std::uint64_t mesh_hash;
 };
-static_assert(sizeof(FactsRecord) == 104);
+static_assert(sizeof(FactsRecord) == 112);
 
 struct Run {
   std::uint32_t first, count;
@@ -38,6 +39,11 @@ struct ViewRecord {
   Run anchors, surface, edges;
 };
 static_assert(sizeof(ViewRecord) == 56);
+
+/// A feature that has votes; they end before `end` and begin where those of the one before end.
+struct FeatureRecord {
+  std::uint32_t feature, end;
+};
 
 struct SectionRecord {
   std::uint64_t at, count;
@@ -113,7 +119,7 @@ bool all_finite(std::span<const Eigen::Vector3f> points) {
 }
 
 bool sound(const PartFacts& part) {
-  for (const double value : {part.pixel_mm, part.noise_mm, part.diameter_mm, part.dz_quantum_mm})
+  for (const double value : {part.pixel_mm, part.noise_mm, part.diameter_mm, part.dz_quantum_mm, part.rotation_gap_rad})
     if (!(value > 0) || !std::isfinite(value)) return false;
   if (part.feature_stride < 1 || part.feature_stride > 64 || !(part.feature_tolerance_mm > 0)) return false;
   if (part.mesh.triangles.empty() || !all_finite(part.mesh.vertices_mm)) return false;
@@ -151,6 +157,7 @@ bool read_facts(std::span<const std::byte> file, std::size_t index_end, PartFact
   part.noise_mm = mm[1];
   part.diameter_mm = mm[2];
   part.dz_quantum_mm = mm[3];
+  part.rotation_gap_rad = record.rotation_gap_rad;
   part.mesh_hash = record.mesh_hash;
   part.mesh.vertices_mm.assign(vertices->begin(), vertices->end());
   part.mesh.triangles.assign(triangles->begin(), triangles->end());
@@ -160,6 +167,21 @@ bool read_facts(std::span<const std::byte> file, std::size_t index_end, PartFact
   part.symmetry.rotations.clear();
   for (const auto& columns : *rotations) part.symmetry.rotations.emplace_back(columns.data());
   return sound(part);
+}
+
+/// Offsets of all features, those without a vote as well.
+bool lay_out(std::span<const FeatureRecord> features, std::size_t votes, std::vector<std::uint32_t>& offsets) {
+  offsets.resize(kFeatureCount + 1);
+  std::uint32_t begin = 0;
+  std::size_t next = 0;  // The feature whose begin is to be written.
+  for (const FeatureRecord& record : features) {
+    if (record.feature < next || record.feature >= kFeatureCount || record.end <= begin) return false;
+    std::fill(offsets.begin() + static_cast<std::ptrdiff_t>(next), offsets.begin() + record.feature + 1, begin);
+    next = record.feature + 1;
+    begin = record.end;
+  }
+  std::fill(offsets.begin() + static_cast<std::ptrdiff_t>(next), offsets.end(), begin);
+  return begin == votes;
 }
 
 std::vector<float> vote_weights(const TrainedPart& part) {
@@ -197,6 +219,7 @@ std::vector<std::byte> encoded(const TrainedPart& part) {
   facts.pixel_noise_diameter_quantum_mm = {part.pixel_mm, part.noise_mm, part.diameter_mm, part.dz_quantum_mm};
   Eigen::Vector3d::Map(facts.symmetry_centre_mm.data()) = part.symmetry.centre_mm;
   Eigen::Vector3d::Map(facts.symmetry_axis.data()) = part.symmetry.axis;
+  facts.rotation_gap_rad = part.rotation_gap_rad;
   facts.mesh_hash = part.mesh_hash;
 
   const std::vector<float> weights = vote_weights(part);
@@ -220,6 +243,10 @@ std::vector<std::byte> encoded(const TrainedPart& part) {
     views.push_back(record);
   }
 
+  std::vector<FeatureRecord> features;
+  for (std::uint32_t f = 0; f < kFeatureCount; ++f)
+    if (part.offsets[f + 1] > part.offsets[f]) features.push_back({f, part.offsets[f + 1]});
+
   Writer out;
   out.add(Section::Facts, std::span<const FactsRecord>(&facts, 1));
   out.add(Section::Name, std::span<const char>(part.part_name));
@@ -227,7 +254,7 @@ std::vector<std::byte> encoded(const TrainedPart& part) {
   out.add(Section::Triangles, part.mesh.triangles);
   out.add(Section::Symmetry, part.symmetry.rotations);
   out.add(Section::Views, views);
-  out.add(Section::Offsets, part.offsets);
+  out.add(Section::Features, features);
   out.end_index();
   out.add(Section::Anchors, anchors);
   out.add(Section::Surface, surface);
@@ -242,12 +269,12 @@ bool read_index(KnowledgeBase::Impl& part) {
   std::memcpy(&index_end, file.data() + kKnowledgeBaseIndexEndAt, 8);
   if (index_end > file.size() || !read_facts(file, index_end, part)) return false;
   const auto views = section_of<ViewRecord>(file, Section::Views, index_end);
-  const auto offsets = section_of<std::uint32_t>(file, Section::Offsets, index_end);
+  const auto features = section_of<FeatureRecord>(file, Section::Features, index_end);
   const auto anchors = section_of<Eigen::Vector3f>(file, Section::Anchors, file.size());
   const auto surface = section_of<SurfaceSample>(file, Section::Surface, file.size());
   const auto edges = section_of<Eigen::Vector3f>(file, Section::Edges, file.size());
   const auto votes = section_of<Vote>(file, Section::Votes, file.size());
-  if (!views || !offsets || !anchors || !surface || !edges || !votes) return false;
+  if (!views || !features || !anchors || !surface || !edges || !votes) return false;
   if (views->empty() || views->size() > kViewsMax) return false;
   for (const ViewRecord& record : *views) {
     const auto own_anchors = part_of(*anchors, record.anchors), own_edges = part_of(*edges, record.edges);
@@ -263,10 +290,8 @@ bool read_index(KnowledgeBase::Impl& part) {
     view.vote_weight = record.vote_weight;
     if (!sound(view)) return false;
   }
-  part.offsets = *offsets;
   part.votes = *votes;
-  return part.offsets.size() == kFeatureCount + 1 && part.offsets.front() == 0 &&
-         part.offsets.back() == part.votes.size() && std::ranges::is_sorted(part.offsets);
+  return lay_out(*features, part.votes.size(), part.offsets);
 }
 
 bool sound_lists(const KnowledgeBase::Impl& part) {

@@ -10,12 +10,12 @@
 ///   for each section its place (u64, a multiple of 64) and its number of items (u64);
 ///   the sections, items of fixed width. Those before Anchors are the index.
 namespace binpick::vision {
-enum class Section { Facts, Name, Vertices, Triangles, Symmetry, Views, Offsets, Anchors, Surface, Edges, Votes };
+enum class Section { Facts, Name, Vertices, Triangles, Symmetry, Views, Features, Anchors, Surface, Edges, Votes };
 inline constexpr std::size_t kSections = 11;
 inline constexpr std::size_t kSectionsAt = 48;
 inline constexpr std::size_t kSectionAlignment = 64;
 inline constexpr std::size_t kKnowledgeBaseHeaderBytes = kSectionsAt + 16 * kSections;
-inline constexpr std::uint32_t kKnowledgeBaseVersion = 2;
+inline constexpr std::uint32_t kKnowledgeBaseVersion = 3;
 
 std::uint64_t knowledge_base_checksum(std::span<const std::byte> file);
 std::uint64_t knowledge_base_index_checksum(std::span<const std::byte> index);

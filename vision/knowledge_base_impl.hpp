@@ -64,6 +64,7 @@ struct PartFacts {
   double dz_quantum_mm = 0.1;
   float feature_tolerance_mm = 1;  ///< Height difference below which two pixels count as equal.
   int feature_stride = 1;          ///< Pixels per unit of the feature's offsets.
+  double rotation_gap_rad = 0.1;   ///< How far off the nearest view usually is.
   std::uint64_t mesh_hash = 0;
   Mesh mesh;
   Symmetry symmetry;
@@ -75,11 +76,12 @@ struct TrainedPart : PartFacts {
   std::vector<Vote> votes;
 };
 
-/// A knowledge base is the bytes of its file, mapped or in memory; what is long is used where it lies.
+/// A knowledge base is the bytes of its file, mapped or in memory; what is long is used where it lies. (Most features
+/// have no vote: the file names the others, and their offsets are laid out at opening.)
 struct KnowledgeBase::Impl : PartFacts {
   std::vector<View> views;
-  std::span<const std::uint32_t> offsets;  ///< As in TrainedPart.
-  std::span<const Vote> votes;             ///< Their rotations are proven by verify() only.
+  std::vector<std::uint32_t> offsets;  ///< As in TrainedPart.
+  std::span<const Vote> votes;         ///< Their rotations are proven by verify() only.
   FileBytes file;
   std::string name;  ///< For messages.
   mutable std::once_flag verify_once;

@@ -294,8 +294,12 @@ std::vector<RestingPose> resting_poses(const Mesh& mesh, const Symmetry& symmetr
   if (!floors.empty()) rests(basins[root(0)], std::numeric_limits<double>::infinity());
 
   std::ranges::stable_sort(all, [](const RestingPose& a, const RestingPose& b) { return a.height_mm < b.height_mm; });
+  return apart(all, symmetry, step_rad);
+}
+
+std::vector<RestingPose> apart(const std::vector<RestingPose>& poses, const Symmetry& symmetry, double step_rad) {
   std::vector<RestingPose> distinct;
-  for (const RestingPose& pose : all)
+  for (const RestingPose& pose : poses)
     if (std::ranges::none_of(distinct, [&](const RestingPose& other) {
           return angle_between(pose.down, other.down, symmetry) < step_rad;
         }))

@@ -28,6 +28,9 @@ struct RestingPose {
 /// `step_rad` apart, each of those that the symmetry makes equal once.
 std::vector<RestingPose> resting_poses(const Mesh& mesh, const Symmetry& symmetry, double barrier_mm, double step_rad);
 
+/// The first of `poses` and of the others those at least `step_rad` from all before them, the symmetry minded.
+std::vector<RestingPose> apart(const std::vector<RestingPose>& poses, const Symmetry& symmetry, double step_rad);
+
 /// Training rotations of a part that lies on a belt: each resting pose in turns about the vertical `turn_rad` apart,
 /// upright and leaning by `lean_rad` to three sides; those that the symmetry makes equal once.
 std::vector<Eigen::Quaterniond> resting_rotations(const std::vector<RestingPose>& poses, const Symmetry& symmetry,

@@ -5,11 +5,13 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <numbers>
 #include <thread>
 
 #include "vision/decimation.hpp"
 #include "vision/knowledge_base_impl.hpp"
 #include "vision/renderer.hpp"
+#include "vision/resting.hpp"
 #include "vision/rotations.hpp"
 #include "vision/surface.hpp"
 #include "vision/view.hpp"
@@ -65,6 +67,36 @@ PartFacts resolved(const Mesh& mesh, const PartOptions& options) {
   part.feature_tolerance_mm =
       static_cast<float>(std::max(1.6 * part.noise_mm, 0.25 * part.pixel_mm * part.feature_stride));
   return part;
+}
+
+/// How far a random rotation is from the nearest of a grid on average (rotations.hpp). A revolution's axes are spread
+/// as densely as those of 10 000 rotations.
+double gap_rad(int rotations, const Symmetry& symmetry) {
+  const bool finite = symmetry.kind == Symmetry::Kind::None || symmetry.kind == Symmetry::Kind::Finite;
+  return 122 * std::numbers::pi / 180 / std::cbrt(finite ? rotations : 10'000);
+}
+
+struct Conveyor {
+  std::size_t poses = 0;
+  std::vector<Eigen::Quaterniond> rotations;
+  double gap_rad = 0;
+};
+
+/// Views of the resting poses: as dense as a sixth of what a bin would take allows, and no denser than serves.
+Conveyor lying_on_a_belt(const PartFacts& part, std::size_t bin_rotations) {
+  constexpr double kDegree = std::numbers::pi / 180;
+  constexpr double kBarrierDiameters = 0.01, kLean = 3 * kDegree, kTurnMin = 4 * kDegree, kTurnMax = 12 * kDegree;
+  Conveyor conveyor;
+  const auto all = resting_poses(part.mesh, part.symmetry, kBarrierDiameters * part.diameter_mm, kTurnMin);
+  for (double turn = kTurnMin;; turn *= 1.1) {
+    // A round part rolls: its lying poses are as far apart as the turns.
+    const auto poses = apart(all, part.symmetry, turn);
+    const bool last = turn * 1.1 > kTurnMax;
+    conveyor.poses = poses.size();
+    conveyor.rotations = resting_rotations(poses, part.symmetry, turn, last ? 0 : kLean);
+    conveyor.gap_rad = 0.5 * turn;
+    if (last || 6 * conveyor.rotations.size() <= bin_rotations) return conveyor;
+  }
 }
 
 struct Trained {
@@ -154,6 +186,7 @@ Expected<KnowledgeBase, MeshError> train(const Mesh& mesh, const PartOptions& op
     std::snprintf(text.data(), text.size(), "%.6g mm", value);
     return std::string{text.data()};
   };
+  if (progress) progress({0.0});
   if (mesh.triangles.empty()) return failed("the mesh holds no triangle; export the part as a surface mesh");
   TrainedPart part;
   static_cast<PartFacts&>(part) = resolved(mesh, options);
@@ -173,8 +206,18 @@ Expected<KnowledgeBase, MeshError> train(const Mesh& mesh, const PartOptions& op
   if (part.diameter_mm < 4 * part.pixel_mm)
     return failed("the part's diameter is " + mm(part.diameter_mm) + ", too small for pixels of " + mm(part.pixel_mm) +
                   "; check mesh_unit, pixel_mm and scanner");
-  const int asked = options.rotations.value_or(part.scanner == ScannerClass::Lms400 ? 10'000 : 20'000);
-  const auto rotations = training_rotations(std::clamp(asked, 1, kRotationsMax), part.symmetry);
+  const int asked =
+      std::clamp(options.rotations.value_or(part.scanner == ScannerClass::Lms400 ? 10'000 : 20'000), 1, kRotationsMax);
+  std::vector<Eigen::Quaterniond> rotations = training_rotations(asked, part.symmetry);
+  part.rotation_gap_rad = gap_rad(asked, part.symmetry);
+  std::size_t resting = 0;
+  if (options.picking == Picking::Conveyor) {
+    Conveyor conveyor = lying_on_a_belt(part, rotations.size());
+    resting = conveyor.poses;
+    if (resting == 0) return failed("the part rests on a belt in no way; check the mesh, or use picking = \"bin\"");
+    rotations = std::move(conveyor.rotations);
+    part.rotation_gap_rad = conveyor.gap_rad;
+  }
   if (threads <= 0) threads = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 64);
   std::vector<Trained> trained = train_views(part, rotations, options.seed, progress, threads);
 
@@ -195,6 +238,7 @@ Expected<KnowledgeBase, MeshError> train(const Mesh& mesh, const PartOptions& op
   if (progress) progress({1.0});
   if (summary != nullptr) {
     summary->symmetry = part.symmetry;
+    summary->resting_poses = resting;
     summary->triangles = mesh.triangles.size();
     summary->triangles_rendered = part.mesh.triangles.size();
     summary->rotations = static_cast<int>(part.views.size());

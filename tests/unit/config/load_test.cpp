@@ -321,7 +321,7 @@ TEST(Part, UnitsOfTheMesh) {
                                    "mesh = \"track_link.stl\"\nmesh_unit = \"inch\"\npicking = \"conveyor\"\n");
   ASSERT_TRUE(part.has_value());
   EXPECT_EQ(part->mesh_unit_mm, 25.4);
-  EXPECT_TRUE(part->conveyor);
+  EXPECT_EQ(part->options.picking, vision::Picking::Conveyor);
 }
 
 TEST(NeedsRestart, NamesTheKeysThatDiffer) {
