@@ -156,10 +156,9 @@ class Collector {
       figures_.first_hypotheses.push_back(static_cast<double>(scene.first->hypotheses));
     }
     for (const auto& [stage, ms] : scene.stages_ms) figures_.stages_ms[stage] += ms;
-    // Stages in an order of their own: as often as not a name says nothing of it, but fewer and fewer are alive.
     for (const auto& [stage, nearest] : scene.alive) {
       auto it = std::ranges::find(figures_.stages, stage, &StageCount::stage);
-      if (it == figures_.stages.end()) it = figures_.stages.insert(it, {stage, 0});
+      if (it == figures_.stages.end()) it = figures_.stages.insert(it, {stage, 0});  // at the end
       const bool refined = stage == "rendered test" || stage == "selection";
       for (std::size_t k = 0; k < nearest.size(); ++k)
         it->alive += judged.to_find[k] && nearest[k] < (refined ? kAliveAfter : kAliveBefore);
@@ -185,19 +184,20 @@ Estimate mean_of(const std::vector<const Estimate*>& parts) {
   return mean;
 }
 
-double calibration_error(const std::vector<Believed>& believed) {
-  constexpr std::size_t kBins = 10;
-  struct Bin {
-    double score = 0, right = 0;
-  };
-  std::array<Bin, kBins> bins{};
+std::array<ScoreBin, 10> score_bins(const std::vector<Believed>& believed) {
+  std::array<ScoreBin, 10> bins{};
   for (const Believed& b : believed) {
-    Bin& bin = bins[static_cast<std::size_t>(std::clamp(b.score * kBins, 0.0, kBins - 1.0))];
+    ScoreBin& bin = bins[static_cast<std::size_t>(std::clamp(b.score * 10, 0.0, 9.0))];
     bin.score += b.score;
     bin.right += b.right;
+    ++bin.count;
   }
+  return bins;
+}
+
+double calibration_error(const std::vector<Believed>& believed) {
   double error = 0;
-  for (const Bin& bin : bins) error += std::abs(bin.right - bin.score);
+  for (const ScoreBin& bin : score_bins(believed)) error += std::abs(bin.right - bin.score);
   return believed.empty() ? 0 : error / static_cast<double>(believed.size());
 }
 

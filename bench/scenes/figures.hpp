@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <map>
 #include <string>
 #include <vector>
@@ -22,6 +23,11 @@ struct Believed {
   double score = 0;
   bool right = false;
 };
+struct ScoreBin {
+  double score = 0, right = 0, count = 0;  ///< Sums.
+};
+/// Ten bins of equal width.
+std::array<ScoreBin, 10> score_bins(const std::vector<Believed>& believed);
 /// Mean of |share of right ones − mean score| over ten bins of the score, by how many fall into each.
 double calibration_error(const std::vector<Believed>& believed);
 

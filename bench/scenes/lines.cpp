@@ -96,9 +96,12 @@ std::string to_json(const SceneLine& line) {
                           {"covariance", of_covariance(d.covariance)}});
   for (const RejectionLine& r : line.rejected)
     rejected.push_back({{"pose", of_pose(r.T_supply_object)}, {"score", r.score}, {"reason", r.reason}});
-  Json& alive = json["alive"] = Json::object();
-  for (const auto& [stage, distances] : line.alive)
-    for (const double d : distances) alive[stage].push_back(rounded(d, 1e-4));
+  Json& alive = json["alive"] = Json::array();
+  for (const auto& [stage, distances] : line.alive) {
+    Json numbers = Json::array();
+    for (const double d : distances) numbers.push_back(rounded(d, 1e-4));
+    alive.push_back({stage, std::move(numbers)});
+  }
   if (line.first)
     json["first"] = {
         {"time_ms", line.first->time_ms}, {"hypotheses", line.first->hypotheses}, {"right", line.first->right}};

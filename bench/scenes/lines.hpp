@@ -48,8 +48,9 @@ struct SceneLine {
   double image_ms = 0;  ///< Of it, points to depth image.
   std::map<std::string, double> stages_ms;
   std::optional<FirstLine> first;
-  /// For each stage and truth: distance of the nearest pose still alive, in part diameters; 9 where none is near.
-  std::map<std::string, std::vector<double>> alive;
+  /// For each stage, in order, and truth: distance of the nearest pose still alive, in part diameters; 9 where none is
+  /// near.
+  std::vector<std::pair<std::string, std::vector<double>>> alive;
 
   std::string key() const;  ///< Tells it from all others of a run.
 };

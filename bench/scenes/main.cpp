@@ -3,6 +3,9 @@
 #include <cstdio>
 #include <exception>
 
+#include "bench/scenes/alarms.hpp"
+#include "bench/scenes/figure7.hpp"
+#include "bench/scenes/noise_truth.hpp"
 #include "bench/scenes/run.hpp"
 #include "bench/scenes/table.hpp"
 
@@ -41,7 +44,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   RunOptions options;
   RunSelection selection;
-  std::string folder;
+  std::string folder, cloud;
 
   CLI::App* run_command = app.add_subcommand("run", "detect in scenes, write one line for each");
   add_run_options(*run_command, options);
@@ -52,11 +55,33 @@ int main(int argc, char** argv) {
       "--scenes", [&](const std::string& text) { set_range(selection, text); }, "FROM:TO, numbers in the split");
   run_command->add_option_function<std::string>(
       "--shard", [&](const std::string& text) { set_shard(selection, text); }, "I/N: every N-th scene, from the I-th");
+  run_command->add_option("--peer", options.peer_scenes,
+                          "the first N scenes of a part by OpenCV's surface_matching too");
+  run_command->add_option("--thorough", options.thorough_scenes, "the first N scenes by our slowest search too");
+
+  std::size_t count = 3000;
+  CLI::App* figure7_command = app.add_subcommand("figure7", "hypotheses and time to the first valid pose");
+  add_run_options(*figure7_command, options);
+  figure7_command->add_option("--count", count, "scenes, at most 3000");
+  figure7_command->add_option_function<std::string>(
+      "--shard", [&](const std::string& text) { set_shard(selection, text); }, "I/N: every N-th scene, from the I-th");
+
+  std::size_t alarms = 100;
+  CLI::App* alarms_command = app.add_subcommand("alarms", "detections where nothing of the part is");
+  add_run_options(*alarms_command, options);
+  alarms_command->add_option("--class", selection.classes, "lps36hi, lps36, lms400 (default: all)");
+  alarms_command->add_option("--count", alarms, "scenes of each kind and class");
+
   CLI::App* table_command = app.add_subcommand("table", "print the figures of a run");
   table_command->add_option("folder", folder, "of the run")->required();
+  CLI::App* noise_command = app.add_subcommand("noise", "the emulated LMS 400 looking at a table, beside a real one");
+  noise_command->add_option("--cloud", cloud, "PLY file in mm to be looked at in the same way");
   CLI11_PARSE(app, argc, argv);
   try {
     if (*run_command) run(options, selection);
+    if (*figure7_command) figure7(options, count, selection.shard, selection.shards);
+    if (*alarms_command) print_false_alarms(options, selection.classes, alarms);
+    if (*noise_command) print_noise_truth(cloud);
     if (*table_command) print_table(folder);
   } catch (const std::exception& e) {
     std::fprintf(stderr, "bench_scenes: %s\n", e.what());

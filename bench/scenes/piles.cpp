@@ -37,6 +37,12 @@ std::vector<ObjectPose> read_poses(const fs::path& file, std::size_t expected) {
   return poses.size() == expected ? poses : std::vector<ObjectPose>{};
 }
 
+std::vector<double> emptied_in_steps(int steps) {
+  std::vector<double> fills;
+  for (int k = steps; k > 0; --k) fills.push_back(static_cast<double>(k) / steps);
+  return fills;
+}
+
 /// Under another name first: shards beside this one read the same folder.
 void write_poses(const fs::path& file, const std::vector<ObjectPose>& poses) {
   const fs::path part = file.string() + "." + hex(std::random_device{}());
@@ -64,8 +70,9 @@ SceneId Split::scene(std::size_t number) const {
 }
 
 const Split* find_split(std::string_view name) {
-  static const std::array<Split, 2> splits{Split{"tune", 1, 10, {1.0, 0.75, 0.5, 0.25}},
-                                           Split{"report", 1'001, 25, {0.9, 0.65, 0.4, 0.15}}};
+  static const std::array<Split, 3> splits{Split{"tune", 1, 10, {1.0, 0.75, 0.5, 0.25}},
+                                           Split{"report", 1'001, 25, {0.9, 0.65, 0.4, 0.15}},
+                                           Split{"figure7", 5'001, 25, emptied_in_steps(120)}};
   const auto it = std::ranges::find(splits, name, &Split::name);
   return it == splits.end() ? nullptr : &*it;
 }

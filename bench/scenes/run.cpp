@@ -5,11 +5,13 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <random>
 #include <stdexcept>
 
 #include "bench/scenes/classes.hpp"
 #include "bench/scenes/commit.hpp"
+#include "bench/scenes/opencv_peer.hpp"
 #include "bench/scenes/scanners.hpp"
 #include "bench/scenes/stage_recall.hpp"
 
@@ -18,6 +20,9 @@ namespace {
 namespace fs = std::filesystem;
 using SteadyClock = std::chrono::steady_clock;
 
+constexpr const char* kPeer = "opencv";
+constexpr const char* kThorough = "thorough";
+
 double ms_since(SteadyClock::time_point from) {
   return std::chrono::duration<double, std::milli>(SteadyClock::now() - from).count();
 }
@@ -25,40 +30,49 @@ double ms_since(SteadyClock::time_point from) {
 /// One part in one class: what its scenes share.
 class PartRun {
  public:
-  PartRun(const RunOptions& options, const RunSelection& selection, const ClassSetting& setting,
-          const std::string& name)
+  PartRun(const RunOptions& options, const ClassSetting& setting, const std::string& name)
       : options_{options},
-        selection_{selection},
         part_{scene_part(setting.scanner, name)},
         judge_{part_},
         base_{knowledge_base_of(part_, (fs::path{options.bases.empty() ? options.out + "/bases" : options.bases} /
                                         (std::string{setting.name} + "-" + name + ".kb"))
                                            .string())} {}
 
-  void scene(const Split& split, std::size_t number, SceneLine& line) const {
+  /// By each of the detectors; `done` gets their lines.
+  template <class Done>
+  void scene(const Split& split, std::size_t number, const std::vector<SceneLine>& wanted, const Done& done) {
     const SceneId id = split.scene(number);
     const auto begin = SteadyClock::now();
     const std::vector<ObjectPose> pile = taken_down(settled_pile(part_, id.pile, options_.piles), id.fill);
     const double settled_ms = ms_since(begin);
     const Scene scene = make_scene(part_, pile, id, options_.bias_mm);
     const double scanned_ms = ms_since(begin) - settled_ms;
-    line.pile = id.pile;
-    line.fill = id.fill;
-    detect_scene(scene, judge_, base_, options_, line);
-    const JudgedScene judged = judge_.judged(line);
-    const Match m = match(judged, 0);
-    std::printf("%s %s %s %3zu: %2zu objects, %2d to find, %2d right, %2d wrong; %.0f ms (pile %.1f s, scan %.2f s)\n",
-                line.scanner.c_str(), line.part.c_str(), line.split.c_str(), number, line.truths.size(), m.to_find,
-                m.right, m.wrong, line.time_ms, settled_ms / 1000, scanned_ms / 1000);
-    std::fflush(stdout);
+    for (SceneLine line : wanted) {
+      line.pile = id.pile;
+      line.fill = id.fill;
+      if (line.detector == kPeer) {
+        if (!peer_) peer_ = std::make_unique<OpencvPeer>(part_, judge_);
+        for (const Truth& t : scene.truths) line.truths.push_back({t.T_supply_object.iso, t.visible, t.told});
+        peer_->detect(scene.points, line);
+      } else {
+        detect_scene(scene, judge_, base_, line.detector == kThorough ? options_.thorough() : options_.detector(),
+                     line);
+      }
+      const Match m = match(judge_.judged(line), 0);
+      std::printf("%s: %zu objects, %d to find, %d right, %d wrong; %.0f ms (pile %.1f s, scan %.2f s)\n",
+                  line.key().c_str(), line.truths.size(), m.to_find, m.right, m.wrong, line.time_ms, settled_ms / 1000,
+                  scanned_ms / 1000);
+      std::fflush(stdout);
+      done(line);
+    }
   }
 
  private:
   const RunOptions& options_;
-  const RunSelection& selection_;
   ScenePart part_;
   Judge judge_;
   vision::KnowledgeBase base_;
+  std::unique_ptr<OpencvPeer> peer_;  // trained when its first scene comes
 };
 
 bool wanted(const std::vector<std::string>& names, std::string_view name) {
@@ -82,6 +96,12 @@ vision::DetectorOptions RunOptions::detector() const {
   if (hypotheses_max > 0) detector.hypotheses_max = hypotheses_max;
   detector.without = {without.begin(), without.end()};
   return detector;
+}
+
+vision::DetectorOptions RunOptions::thorough() const {
+  vision::DetectorOptions thorough = detector();
+  thorough.hypotheses_max = 1 << 20;
+  return thorough;
 }
 
 Scene make_scene(const ScenePart& part, const std::vector<ObjectPose>& poses, const SceneId& id, double bias_mm) {
@@ -113,11 +133,10 @@ vision::KnowledgeBase knowledge_base_of(const ScenePart& part, const std::string
   return std::move(*trained);
 }
 
-void detect_scene(const Scene& scene, const Judge& judge, const vision::KnowledgeBase& base, const RunOptions& options,
-                  SceneLine& line) {
+void detect_scene(const Scene& scene, const Judge& judge, const vision::KnowledgeBase& base,
+                  vision::DetectorOptions options, SceneLine& line) {
   StageRecall recall{judge, scene.truths, base};
-  vision::DetectorOptions detector = options.detector();
-  detector.observer = [&](const vision::StageSurvivors& alive) { recall(alive); };
+  options.observer = [&](const vision::StageSurvivors& alive) { recall(alive); };
   const auto begin = SteadyClock::now();
   const vision::SupplyBox supply{setting_of(base.scanner()).supply_mm};
   const vision::DepthWindow window = vision::window_of(supply);
@@ -125,7 +144,7 @@ void detect_scene(const Scene& scene, const Judge& judge, const vision::Knowledg
   builder.add(scene.points);
   const vision::DepthImage image = builder.image();
   line.image_ms = ms_since(begin);
-  const vision::DetectionReport report = vision::detect(image, supply, base, detector);
+  const vision::DetectionReport report = vision::detect(image, supply, base, options);
 
   line.time_ms = line.image_ms + report.time_ms;
   line.points = scene.points.size();
@@ -147,6 +166,8 @@ void detect_scene(const Scene& scene, const Judge& judge, const vision::Knowledg
 void run(const RunOptions& options, const RunSelection& selection) {
   const Split* split = find_split(selection.split);
   if (split == nullptr) throw std::runtime_error{"no split \"" + selection.split + "\"; there are tune and report"};
+  if (options.peer_scenes > 0 && !OpencvPeer::built())
+    throw std::runtime_error{"built without OpenCV's surface_matching; .ci/install bench, configure and build again"};
   const RunHeader header = options.header();
   const RunFolder before = read_run(options.out);
   if (before.header && *before.header != header)
@@ -162,16 +183,24 @@ void run(const RunOptions& options, const RunSelection& selection) {
       if (!wanted(selection.classes, setting.name) || !wanted(selection.parts, name)) continue;
       std::optional<PartRun> part;  // trained when the first scene asks for it
       for (std::size_t number = selection.from; number < std::min(selection.to, split->scenes()); ++number) {
-        SceneLine line;
-        line.scanner = setting.name;
-        line.part = name;
-        line.split = split->name;
-        line.number = number;
-        if (number % selection.shards != selection.shard || before.scenes.contains(line.key())) continue;
-        if (!part) part.emplace(options, selection, setting, name);
-        part->scene(*split, number, line);
-        out << to_json(line) << '\n' << std::flush;
-        if (!out) throw std::runtime_error{file + ": cannot be written; check folder and free space"};
+        if (number % selection.shards != selection.shard) continue;
+        std::vector<SceneLine> missing;
+        for (const auto& [detector, until] : {std::pair{"binpick", selection.to}, std::pair{kPeer, options.peer_scenes},
+                                              std::pair{kThorough, options.thorough_scenes}}) {
+          SceneLine line;
+          line.detector = detector;
+          line.scanner = setting.name;
+          line.part = name;
+          line.split = split->name;
+          line.number = number;
+          if (number < until && !before.scenes.contains(line.key())) missing.push_back(std::move(line));
+        }
+        if (missing.empty()) continue;
+        if (!part) part.emplace(options, setting, name);
+        part->scene(*split, number, missing, [&](const SceneLine& line) {
+          out << to_json(line) << '\n' << std::flush;
+          if (!out) throw std::runtime_error{file + ": cannot be written; check folder and free space"};
+        });
       }
     }
 }

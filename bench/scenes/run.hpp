@@ -18,8 +18,11 @@ struct RunOptions {
   int hypotheses_max = 0;  ///< 0: the detector's default.
   double bias_mm = 0;
   std::vector<std::string> without;
+  std::size_t peer_scenes = 0;  ///< So many of a part's first scenes are shown to OpenCV's surface_matching as well,
+  std::size_t thorough_scenes = 0;  ///< and so many to our own search with all that it can try.
   RunHeader header() const;
   vision::DetectorOptions detector() const;
+  vision::DetectorOptions thorough() const;
 };
 
 /// A scene as a detector gets it, with what is true of it.
@@ -34,8 +37,8 @@ Scene make_scene(const ScenePart& part, const std::vector<ObjectPose>& poses, co
 vision::KnowledgeBase knowledge_base_of(const ScenePart& part, const std::string& file);
 
 /// Detects once and writes down what came out; `line` has its names already.
-void detect_scene(const Scene& scene, const Judge& judge, const vision::KnowledgeBase& base, const RunOptions& options,
-                  SceneLine& line);
+void detect_scene(const Scene& scene, const Judge& judge, const vision::KnowledgeBase& base,
+                  vision::DetectorOptions options, SceneLine& line);
 
 struct RunSelection {
   std::vector<std::string> classes, parts;  ///< Empty: all.

@@ -14,8 +14,8 @@ StageRecall::StageRecall(const Judge& judge, std::span<const Truth> truths, cons
     : judge_{judge}, truths_{truths}, base_{base} {}
 
 void StageRecall::operator()(const vision::StageSurvivors& alive) {
-  std::vector<double>& nearest = nearest_[std::string{alive.stage}];
-  nearest.assign(truths_.size(), kFar);
+  std::vector<double>& nearest =
+      nearest_.emplace_back(std::string{alive.stage}, std::vector<double>(truths_.size(), kFar)).second;
   const double near_mm = kNearDiameters * judge_.diameter_mm();
   for (std::size_t k = 0; k < truths_.size(); ++k) {
     const Eigen::Isometry3d& truth = truths_[k].T_supply_object.iso;

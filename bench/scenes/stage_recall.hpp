@@ -1,8 +1,8 @@
 #pragma once
 
-#include <map>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bench/scenes/judge.hpp"
@@ -16,13 +16,13 @@ class StageRecall {
 
   void operator()(const vision::StageSurvivors& alive);
   /// In part diameters; kFar where nothing is near.
-  const std::map<std::string, std::vector<double>>& nearest() const { return nearest_; }
+  const std::vector<std::pair<std::string, std::vector<double>>>& nearest() const { return nearest_; }
   static constexpr double kFar = 9;
 
  private:
   const Judge& judge_;
   std::span<const Truth> truths_;
   const vision::KnowledgeBase& base_;
-  std::map<std::string, std::vector<double>> nearest_;
+  std::vector<std::pair<std::string, std::vector<double>>> nearest_;
 };
 }  // namespace binpick::bench

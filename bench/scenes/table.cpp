@@ -7,11 +7,15 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "bench/scenes/charts.hpp"
 #include "bench/scenes/classes.hpp"
 #include "bench/scenes/figures.hpp"
 
 namespace binpick::bench {
 namespace {
+/// Fewer say nothing of a share.
+constexpr double kBinMin = 10;
+
 struct ClassFigures {
   std::string name;
   std::vector<PartFigures> parts;
@@ -90,10 +94,8 @@ void print_stages(const std::vector<ClassFigures>& classes) {
       ".1).\n");
   for (const ClassFigures& figures : classes)
     for (const PartFigures& p : figures.parts) {
-      std::vector<StageCount> stages = p.stages;
-      std::ranges::stable_sort(stages, [](const StageCount& a, const StageCount& b) { return a.alive > b.alive; });
       std::printf("  %s %s (%d):", figures.name.c_str(), p.name.c_str(), p.to_find);
-      for (const StageCount& stage : stages)
+      for (const StageCount& stage : p.stages)
         std::printf(" %s %.3f;", stage.stage.c_str(), ratio(stage.alive, p.to_find));
       std::printf("\n");
     }
@@ -157,6 +159,61 @@ std::vector<ClassFigures> collected(const RunFolder& run, const std::string& det
   }
   return classes;
 }
+/// Another detector beside ours, on those scenes only that both saw.
+void print_peer(const RunFolder& run, const std::string& detector) {
+  RunFolder common;
+  for (const auto& [key, scene] : run.scenes) {
+    if (scene.detector != detector) continue;
+    SceneLine ours = scene;
+    ours.detector = "binpick";
+    const auto it = run.scenes.find(ours.key());
+    if (it == run.scenes.end()) continue;
+    common.scenes[key] = scene;
+    common.scenes[ours.key()] = it->second;
+  }
+  if (common.scenes.empty()) return;
+  const auto ours = collected(common, "binpick"), theirs = collected(common, detector);
+  std::printf(
+      "\n| %s beside binpick, the same %zu scenes | AP | binpick | 1 - AP, ratio | first right | binpick | ms p50 | "
+      "binpick | times as fast |\n|---|---|---|---|---|---|---|---|---|\n",
+      detector.c_str(), common.scenes.size() / 2);
+  for (std::size_t c = 0; c < theirs.size(); ++c) {
+    const auto mean = [](const ClassFigures& figures, Estimate PartFigures::*of) {
+      double sum = 0;
+      for (const PartFigures& part : figures.parts) sum += (part.*of).value;
+      return sum / static_cast<double>(figures.parts.size());
+    };
+    const double ap = mean(ours[c], &PartFigures::ap), their_ap = mean(theirs[c], &PartFigures::ap);
+    const double ms = quantile(all_of(ours[c], &PartFigures::time_ms), 0.5),
+                 their_ms = quantile(all_of(theirs[c], &PartFigures::time_ms), 0.5);
+    std::printf("| %s | %.3f | %.3f | %.2f | %.3f | %.3f | %.0f | %.0f | %.0f |\n", theirs[c].name.c_str(), their_ap,
+                ap, (1 - ap) / std::max(1e-9, 1 - their_ap), mean(theirs[c], &PartFigures::first_right),
+                mean(ours[c], &PartFigures::first_right), their_ms, ms, their_ms / ms);
+  }
+}
+
+void draw(const std::string& folder, const std::vector<ClassFigures>& classes) {
+  std::printf("\n");
+  std::vector<Series> reliability{{"as it should be", {{0, 0}, {1, 1}}, false, false, true}};
+  for (const ClassFigures& figures : classes) {
+    std::vector<Series> curves;
+    std::vector<Believed> believed;
+    for (const PartFigures& part : figures.parts) {
+      Series& curve = curves.emplace_back(Series{part.name, {}, true, false, false});
+      for (const MeanPoint& point : mean_curve(part.curves)) curve.points.push_back({point.recall, point.precision});
+      believed.insert(believed.end(), part.believed.begin(), part.believed.end());
+    }
+    write_text(folder + "/precision-recall-" + figures.name + ".svg",
+               line_chart("Precision and recall, " + figures.name, {"recall (mean over scenes)", 0, 1, 10},
+                          {"precision (mean over scenes)", 0.5, 1, 5}, curves));
+    Series& series = reliability.emplace_back(Series{figures.name, {}, false, true, false});
+    for (const ScoreBin& bin : score_bins(believed))
+      if (bin.count >= kBinMin) series.points.push_back({bin.score / bin.count, bin.right / bin.count});
+  }
+  write_text(folder + "/reliability.svg",
+             line_chart("Is the score a probability? Bins of ten detections and more", {"score", 0, 1, 10},
+                        {"share of right ones", 0, 1, 10}, reliability));
+}
 }  // namespace
 
 void print_table(const std::string& folder) {
@@ -170,5 +227,8 @@ void print_table(const std::string& folder) {
   print_stages(classes);
   print_times(classes);
   print_reliability(classes);
+  print_peer(run, "opencv");
+  print_peer(run, "thorough");
+  draw(folder, classes);
 }
 }  // namespace binpick::bench

@@ -31,7 +31,7 @@ SceneLine a_scene(std::uint64_t number) {
   line.detections = {detection};
   line.rejected = {{Eigen::Isometry3d::Identity(), 0.2, "free space seen through it"}};
   line.first = FirstLine{12.5, 7, true};
-  line.alive["votes"] = {0.25};
+  line.alive = {{"votes", {0.25}}, {"sparse test", {0.5}}};
   line.stages_ms["votes"] = 3.5;
   return line;
 }
