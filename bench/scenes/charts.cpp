@@ -82,8 +82,10 @@ class Chart {
 };
 }  // namespace
 
-std::string line_chart(const std::string& title, const Axis& x, const Axis& y, const std::vector<Series>& series) {
+std::string line_chart(const std::string& title, const Axis& x, const Axis& y, const std::vector<Series>& series,
+                       double legend_at) {
   Chart chart{title, x, y};
+  const double legend_x = kLeft + 10 + legend_at * (kWidth - kLeft - kRight);
   double legend = kHeight - kBottom - 8 - 16 * static_cast<double>(series.size() - 1);
   for (std::size_t k = 0; k < series.size(); ++k) {
     const char* colour = kColours[k % kColours.size()];
@@ -95,8 +97,9 @@ std::string line_chart(const std::string& title, const Axis& x, const Axis& y, c
       if (series[k].dots) chart.dot(p, colour);
     }
     chart.path(pixels, colour, 2, series[k].dashed);
-    chart.path({{kLeft + 10, legend - 4}, {kLeft + 34, legend - 4}}, colour, 2, series[k].dashed);
-    chart.text(kLeft + 40, legend, series[k].name, "start");
+    if (!series[k].points.empty() && !series[k].dashed) chart.dot(series[k].points.back(), colour);
+    chart.path({{legend_x, legend - 4}, {legend_x + 24, legend - 4}}, colour, 2, series[k].dashed);
+    chart.text(legend_x + 30, legend, series[k].name, "start");
     legend += 16;
   }
   return chart.finished();

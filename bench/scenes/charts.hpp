@@ -15,11 +15,12 @@ struct Series {
   std::string name;
   std::vector<Eigen::Vector2d> points;
   bool steps = false;  ///< Level until the next point.
-  bool dots = false;   ///< Marks on the points.
+  bool dots = false;   ///< Marks on all points; else on the last one, where another series may hide the line.
   bool dashed = false;
 };
-/// A series beyond the axes is cut off at the frame.
-std::string line_chart(const std::string& title, const Axis& x, const Axis& y, const std::vector<Series>& series);
+/// A series beyond the axes is cut off at the frame. `legend_at`: its left end, share of the width.
+std::string line_chart(const std::string& title, const Axis& x, const Axis& y, const std::vector<Series>& series,
+                       double legend_at = 0);
 
 /// How many of `values` fall into each of `bins` between the axis' ends; the last bin holds what is larger. `mark`: a
 /// dashed line with its label.

@@ -95,7 +95,6 @@ class Collector {
       for (std::size_t i = 0; i < scene.detections.size(); ++i) {
         if (sure.verdict[i] != Verdict::Right) continue;
         const TruthLine& truth = scene.truths[static_cast<std::size_t>(sure.truth[i])];
-        if (!truth.told) continue;
         const auto& pose = scene.detections[i].T_supply_object;
         const auto error = judge_.measure(true).error(pose, truth.T_supply_object);
         t_mm.back().push_back(error.centroid_mm.norm());

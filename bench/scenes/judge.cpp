@@ -26,7 +26,7 @@ JudgedScene Judge::judged(const SceneLine& scene, double threshold_diameters) co
   judged.threshold_mm = threshold_diameters * diameter_mm();
   judged.distance_mm.resize(static_cast<Eigen::Index>(scene.detections.size()),
                             static_cast<Eigen::Index>(scene.truths.size()));
-  for (const TruthLine& truth : scene.truths) judged.to_find.push_back(truth.visible >= kVisibleMin);
+  for (const TruthLine& truth : scene.truths) judged.to_find.push_back(truth.visible >= kVisibleMin && truth.told);
   for (std::size_t i = 0; i < scene.detections.size(); ++i) {
     judged.scores.push_back(scene.detections[i].score);
     for (std::size_t k = 0; k < scene.truths.size(); ++k)

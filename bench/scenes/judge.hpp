@@ -10,7 +10,7 @@
 #include "bench/scenes/truth.hpp"
 
 namespace binpick::bench {
-/// From here on an object is to be found.
+/// From here on an object is to be found, if its pose can be told at all.
 inline constexpr double kVisibleMin = 0.5;
 /// Right is nearer than this share of the diameter.
 inline constexpr double kRightDiameters = 0.1;

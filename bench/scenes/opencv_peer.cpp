@@ -1,8 +1,10 @@
 #include "bench/scenes/opencv_peer.hpp"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
+#include <map>
 #include <opencv2/core.hpp>
 #include <opencv2/surface_matching.hpp>
 #include <opencv2/surface_matching/ppf_helpers.hpp>
@@ -48,9 +50,28 @@ cv::Mat model_of(const vision::Mesh& mesh) {
   return model;
 }
 
-cv::Vec2f range(const std::vector<Eigen::Vector3f>& points, int axis) {
-  const auto [low, high] = std::ranges::minmax(points, {}, [axis](const Eigen::Vector3f& p) { return p[axis]; });
-  return {low[axis], high[axis]};
+/// One point for each cube of this edge, with the mean normal. The library's own sampling cuts each axis into as many
+/// pieces, however long it is: a flat scene would keep most of its points, and matching take minutes.
+cv::Mat sampled(const cv::Mat& cloud, double edge_mm) {
+  using Vector6f = Eigen::Matrix<float, 6, 1>;
+  std::map<std::array<int, 3>, std::pair<Vector6f, int>> cubes;
+  for (int i = 0; i < cloud.rows; ++i) {
+    const Vector6f row = Eigen::Map<const Vector6f>(cloud.ptr<float>(i));
+    if (!row.allFinite()) continue;
+    std::array<int, 3> cube{};
+    for (int k = 0; k < 3; ++k) cube[static_cast<std::size_t>(k)] = static_cast<int>(std::floor(row[k] / edge_mm));
+    auto& [sum, n] = cubes.try_emplace(cube, Vector6f::Zero(), 0).first->second;
+    sum += row;
+    ++n;
+  }
+  cv::Mat kept(static_cast<int>(cubes.size()), 6, CV_32F);
+  int row = 0;
+  for (const auto& [cube, points] : cubes) {
+    Eigen::Map<Vector6f> mean{kept.ptr<float>(row++)};
+    mean = points.first / static_cast<float>(points.second);
+    mean.tail<3>().normalize();
+  }
+  return kept;
 }
 
 Eigen::Isometry3d iso_of(const cv::Matx44d& pose) {
@@ -99,14 +120,11 @@ void OpencvPeer::detect(const std::vector<Eigen::Vector3f>& points, SceneLine& l
     ppf::computeNormalsPC3d(cloud, scene, kNormalNeighbours, true,
                             cv::Vec3f(0, 0, static_cast<float>(figures.stand_off_mm)));
     std::vector<ppf::Pose3DPtr> poses;
-    // The library takes the scene's sampling relative to the scene's extent; it is to be the model's.
-    const double extent_mm = impl_->setting.supply_mm.head<2>().maxCoeff();
-    const double sampling = kSampling * impl_->judge.diameter_mm() / extent_mm;
-    impl_->detector.match(scene, poses, kReferences, sampling);
+    // As dense as the model. The library takes the step relative to the scene's extent.
+    const double step_mm = kSampling * impl_->judge.diameter_mm();
+    const cv::Mat sparse = sampled(scene, step_mm);
+    impl_->detector.match(sparse, poses, kReferences, step_mm / impl_->setting.supply_mm.head<2>().maxCoeff());
     poses.resize(std::min(poses.size(), kPosesMax));
-    // On all points of model and scene the library's ICP takes minutes for a scene.
-    cv::Vec2f x = range(inside, 0), y = range(inside, 1), z = range(inside, 2);
-    const cv::Mat sparse = ppf::samplePCByQuantization(scene, x, y, z, static_cast<float>(0.4 * sampling), 0);
     ppf::ICP icp(50, 0.005F, 2.5F, 4);
     if (!poses.empty()) icp.registerModelToScene(impl_->model.rowRange(0, kIcpPoints).clone(), sparse, poses);
     std::ranges::stable_sort(poses, {}, [](const ppf::Pose3DPtr& p) { return -static_cast<double>(p->numVotes); });

@@ -17,7 +17,7 @@ struct ScenePart {
   vision::Symmetry::Kind symmetry = vision::Symmetry::Kind::None;  ///< What the class's scanner can tell.
   std::size_t order = 1;                                           ///< Of a finite group.
   /// What tells the near-symmetric poses of the part apart, object frame; empty: it has none. Where the scanner sees
-  /// nothing of it, they are the same to it: see truth.hpp.
+  /// nothing of it, nobody can know the pose: see truth.hpp.
   std::function<bool(const Eigen::Vector3d& p_object_mm)> tells;
 };
 

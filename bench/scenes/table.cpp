@@ -212,7 +212,7 @@ void draw(const std::string& folder, const std::vector<ClassFigures>& classes) {
   }
   write_text(folder + "/reliability.svg",
              line_chart("Is the score a probability? Bins of ten detections and more", {"score", 0, 1, 10},
-                        {"share of right ones", 0, 1, 10}, reliability));
+                        {"share of right ones", 0, 1, 10}, reliability, 0.75));
 }
 }  // namespace
 

@@ -12,8 +12,9 @@ struct Truth {
   /// Points that the ideal scanner measures on it in the scene, over those it would measure on it alone, without supply
   /// and neighbours: what lies in the shadow of a wall counts as hidden.
   double visible = 0;
-  /// The ideal scanner measures enough of what tells near-symmetric poses apart (ScenePart::tells). Else such poses are
-  /// one and the same to any method, and each of them is right.
+  /// The ideal scanner measures enough of what tells near-symmetric poses apart (ScenePart::tells). Else no method can
+  /// know the pose: it is not to be found, and whoever finds it in any of its near-symmetric poses is neither right nor
+  /// wrong.
   bool told = true;
 };
 

@@ -65,6 +65,15 @@ TEST(SceneParts, AShaftIsToldByItsKeywayOnly) {
   turned.linear() = Eigen::AngleAxisd{2, Eigen::Vector3d::UnitZ()}.toRotationMatrix();
   EXPECT_GT(judge.measure(true).distance_mm(turned, Eigen::Isometry3d::Identity()), judge.threshold_mm());
   EXPECT_LT(judge.measure(false).distance_mm(turned, Eigen::Isometry3d::Identity()), 1);
+  // Where the keyway is not seen, the turned one is neither right nor wrong; where it is seen, it is wrong.
+  for (const bool told : {false, true}) {
+    SceneLine line;
+    line.truths = {{Eigen::Isometry3d::Identity(), 0.9, told}};
+    line.detections.emplace_back().T_supply_object = turned;
+    const Match m = match(judge.judged(line), 0);
+    EXPECT_EQ(m.to_find, told ? 1 : 0);
+    EXPECT_EQ(m.verdict.front(), told ? Verdict::Wrong : Verdict::Neutral);
+  }
 }
 
 TEST(Splits, ShareNeitherPilesNorFillLevelsAndNameEachSceneOnce) {
