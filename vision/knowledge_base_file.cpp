@@ -276,6 +276,7 @@ bool read_index(KnowledgeBase::Impl& part) {
   const auto votes = section_of<Vote>(file, Section::Votes, file.size());
   if (!views || !features || !anchors || !surface || !edges || !votes) return false;
   if (views->empty() || views->size() > kViewsMax) return false;
+  part.views.reserve(views->size());
   for (const ViewRecord& record : *views) {
     const auto own_anchors = part_of(*anchors, record.anchors), own_edges = part_of(*edges, record.edges);
     const auto own_surface = part_of(*surface, record.surface);
