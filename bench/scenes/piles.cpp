@@ -37,9 +37,11 @@ std::vector<ObjectPose> read_poses(const fs::path& file, std::size_t expected) {
   return poses.size() == expected ? poses : std::vector<ObjectPose>{};
 }
 
-std::vector<double> emptied_in_steps(int steps) {
+/// Every level once, neighbours far apart.
+std::vector<double> even_fills(int levels) {
+  constexpr int kStride = 49;  // shares no factor with the number of levels
   std::vector<double> fills;
-  for (int k = steps; k > 0; --k) fills.push_back(static_cast<double>(k) / steps);
+  for (int k = 0; k < levels; ++k) fills.push_back(static_cast<double>(k * kStride % levels + 1) / levels);
   return fills;
 }
 
@@ -72,7 +74,7 @@ SceneId Split::scene(std::size_t number) const {
 const Split* find_split(std::string_view name) {
   static const std::array<Split, 3> splits{Split{"tune", 1, 10, {1.0, 0.75, 0.5, 0.25}},
                                            Split{"report", 1'001, 25, {0.9, 0.65, 0.4, 0.15}},
-                                           Split{"figure7", 5'001, 25, emptied_in_steps(120)}};
+                                           Split{"figure7", 5'001, 25, even_fills(120)}};
   const auto it = std::ranges::find(splits, name, &Split::name);
   return it == splits.end() ? nullptr : &*it;
 }

@@ -96,6 +96,9 @@ TEST(Splits, ShareNeitherPilesNorFillLevelsAndNameEachSceneOnce) {
       }
     }
   }
+  const Split& figure7 = *find_split("figure7");
+  EXPECT_EQ(figure7.scenes(), 3000U);
+  EXPECT_EQ((std::set<double>{figure7.fills.begin(), figure7.fills.end()}.size()), figure7.fills.size());
   std::set<double> of_four;
   for (std::size_t k = 0; k < 4; ++k) of_four.insert(tune.scene(k).fill);
   EXPECT_EQ(of_four.size(), 4U) << "a few scenes are a fair sample";
