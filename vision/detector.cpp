@@ -9,9 +9,11 @@
 #include <numbers>
 
 #include "base/check.hpp"
+#include "vision/exhaustive.hpp"
 #include "vision/feature.hpp"
 #include "vision/knowledge_base_impl.hpp"
 #include "vision/maxima.hpp"
+#include "vision/prepared.hpp"
 #include "vision/selection.hpp"
 #include "vision/team.hpp"
 #include "vision/voting.hpp"
@@ -22,8 +24,10 @@ using SteadyClock = std::chrono::steady_clock;
 
 /// How many hypotheses survive each stage. Thousands are cheap to test and dear to lose; only distinct survivors pay
 /// for a rendered test.
-constexpr std::size_t kSparseBest = 1500;
-constexpr std::size_t kDistinctBest = 240;
+constexpr std::size_t kSparseBest = 3000;
+constexpr std::size_t kDistinctBest = 500;
+constexpr std::size_t kRenderedBest = 120;
+constexpr std::size_t kRenderedCrowdMax = 3;
 constexpr std::size_t kTurnedBest = 16;
 /// So many poses of one place are enough: a well-seen object must not crowd out the others.
 constexpr std::size_t kCrowdMax = 10;
@@ -77,7 +81,7 @@ class Detecting {
         supply_{supply},
         part_{base.impl()},
         options_{options},
-        rasteriser_{part_.mesh},
+        rasteriser_{prepared(part_).rasteriser()},
         centroid_{part_.mesh.centroid_mm().cast<float>()} {
     noise_mm_ = std::max(options.noise_mm.value_or(part_.noise_mm), 1e-3);
     double sum = 0;
@@ -96,16 +100,26 @@ class Detecting {
     report_.maxima = maxima.size();
     ended("maxima");
     observed({"maxima", maxima, {}});
-    const std::vector<Ballot> ballots = ballots_of(maxima);
-    ended("votes");
-    observed("votes", ballots, [&](const Ballot& b) { return pose_at(maxima[b.maximum], part_.views[b.view]).iso(); });
-    std::vector<Hypothesis> hypotheses = tested(maxima, ballots);
+    std::vector<Hypothesis> hypotheses;
+    if (options_.search == Search::Votes) {
+      const std::vector<Ballot> ballots = ballots_of(maxima);
+      ended("votes");
+      observed("votes", ballots,
+               [&](const Ballot& b) { return pose_at(maxima[b.maximum], part_.views[b.view]).iso(); });
+      hypotheses = tested(maxima, ballots);
+    } else {
+      hypotheses = tested_all(maxima);
+    }
     ended("sparse test");
     observed("sparse test", hypotheses, [](const Hypothesis& h) { return h.pose.iso(); });
     nudge(hypotheses);
-    hypotheses = distinct(std::move(hypotheses));
+    hypotheses = distinct(std::move(hypotheses), kDistinctBest, kCrowdMax);
     ended("first refinement");
     observed("first refinement", hypotheses, [](const Hypothesis& h) { return h.pose.iso(); });
+    first_look(hypotheses);
+    hypotheses = distinct(std::move(hypotheses), kRenderedBest, kRenderedCrowdMax);
+    ended("first look");
+    observed("first look", hypotheses, [](const Hypothesis& h) { return h.pose.iso(); });
     std::vector<Candidate> candidates = rendered(hypotheses);
     add_turned(candidates);
     ended("rendered test");
@@ -168,30 +182,52 @@ class Detecting {
     return vote(smooth, part_, maxima, votes, deadline_);
   }
 
-  Pose pose_at(const Eigen::Vector3f& anchor, const View& view) const {
+  static Pose pose_at(const Eigen::Vector3f& place, const View& view, std::size_t anchor = 0) {
     Pose pose;
     pose.R = view.R_supply_object.toRotationMatrix();
-    pose.t = anchor - pose.R * view.anchors_object_mm.front();
+    pose.t = place - pose.R * view.anchors_object_mm[anchor];
     return pose;
+  }
+
+  /// As wide as the grid of rotations is coarse.
+  float coarse_tolerance_mm() const {
+    return static_cast<float>(std::max(kSparseToleranceDiameters * coarseness() * part_.diameter_mm,
+                                       static_cast<double>(tolerance_of(scene_))));
+  }
+
+  static void keep_best(std::vector<Hypothesis>& hypotheses, std::size_t most) {
+    std::stable_sort(hypotheses.begin(), hypotheses.end(), stronger);
+    if (hypotheses.size() > most)
+      hypotheses.erase(hypotheses.begin() + static_cast<std::ptrdiff_t>(most), hypotheses.end());
+  }
+
+  std::vector<Hypothesis> tested_all(const std::vector<Eigen::Vector3f>& maxima) {
+    ExhaustiveOptions search;
+    search.tolerance_mm = coarse_tolerance_mm();
+    search.z_floor_mm = lowest_allowed_mm_;
+    search.threads = options_.threads;
+    std::vector<Hypothesis> hypotheses;
+    for (const Standing& s : search_all(scene_, part_, maxima, search, deadline_, report_.hypotheses))
+      hypotheses.push_back({s.maximum, s.view, pose_at(maxima[s.maximum], part_.views[s.view], s.anchor), s.evidence});
+    keep_best(hypotheses, kSparseBest);
+    return hypotheses;
   }
 
   std::vector<Hypothesis> tested(const std::vector<Eigen::Vector3f>& maxima, const std::vector<Ballot>& ballots) {
     report_.hypotheses = ballots.size();
-    const auto tolerance = static_cast<float>(std::max(kSparseToleranceDiameters * coarseness() * part_.diameter_mm,
-                                                       static_cast<double>(tolerance_of(scene_))));
+    const float tolerance = coarse_tolerance_mm();
     std::vector<float> evidence(ballots.size(), -1);
     constexpr std::size_t kBlock = 64;
     share(options_.threads, (ballots.size() + kBlock - 1) / kBlock, deadline_, [&](std::size_t block, int) {
       for (std::size_t i = block * kBlock; i < std::min(ballots.size(), (block + 1) * kBlock); ++i)
-        evidence[i] = sparse_evidence(scene_, part_.views[ballots[i].view], maxima[ballots[i].maximum], tolerance);
+        evidence[i] = sparse_evidence(scene_, part_, ballots[i].view, maxima[ballots[i].maximum], tolerance);
     });
     std::vector<Hypothesis> hypotheses;
     for (std::size_t i = 0; i < ballots.size(); ++i)
       if (evidence[i] > 0)
         hypotheses.push_back({ballots[i].maximum, ballots[i].view,
                               pose_at(maxima[ballots[i].maximum], part_.views[ballots[i].view]), evidence[i]});
-    std::stable_sort(hypotheses.begin(), hypotheses.end(), stronger);
-    if (hypotheses.size() > kSparseBest) hypotheses.resize(kSparseBest);
+    keep_best(hypotheses, kSparseBest);
     return hypotheses;
   }
 
@@ -208,7 +244,7 @@ class Detecting {
       Hypothesis& h = hypotheses[i];
       const View& view = part_.views[h.view];
       refine(scene_, model_points(view, h.pose), h.pose.R * centroid_ + h.pose.t, options, h.pose);
-      h.evidence = sparse_evidence(scene_, view, h.pose, 2 * tolerance);
+      h.evidence = sparse_evidence(scene_, part_, h.view, h.pose, 2 * tolerance);
     });
   }
 
@@ -217,13 +253,13 @@ class Detecting {
     return std::max(pixels, static_cast<float>(diameters * part_.diameter_mm / scene_.pixel_mm));
   }
 
-  std::vector<Hypothesis> distinct(std::vector<Hypothesis> hypotheses) const {
+  std::vector<Hypothesis> distinct(std::vector<Hypothesis> hypotheses, std::size_t most, std::size_t crowd) const {
     std::stable_sort(hypotheses.begin(), hypotheses.end(), stronger);
     const double same_mm = 0.04 * part_.diameter_mm, crowd_mm = 0.15 * part_.diameter_mm;
     std::vector<Hypothesis> kept;
     std::vector<Eigen::Vector3f> centres;
     for (const Hypothesis& h : hypotheses) {
-      if (kept.size() >= kDistinctBest || h.evidence <= 0) break;
+      if (kept.size() >= most || h.evidence <= 0) break;
       const Eigen::Vector3f centre = h.pose.R * centroid_ + h.pose.t;
       bool again = false;
       std::size_t near = 0;
@@ -233,11 +269,23 @@ class Detecting {
         again =
             apart < same_mm && displacement_mm({kept[k].pose, {}}, {h.pose, {}}, part_.symmetry, radius_mm_) < same_mm;
       }
-      if (again || near >= kCrowdMax) continue;
+      if (again || near >= crowd) continue;
       kept.push_back(h);
       centres.push_back(centre);
     }
     return kept;
+  }
+
+  /// Rendered and compared as it is: cheaper than refinement by far, and tells which hypotheses of a place are worth
+  /// it.
+  void first_look(std::vector<Hypothesis>& hypotheses) const {
+    std::vector<Template> drawn(static_cast<std::size_t>(std::clamp(options_.threads, 1, 64)));
+    share(options_.threads, hypotheses.size(), deadline_, [&](std::size_t i, int thread) {
+      Hypothesis& h = hypotheses[i];
+      Template& t = drawn[static_cast<std::size_t>(thread)];
+      rasteriser_.draw(h.pose.R, h.pose.t, scene_.pixel_mm, scene_.origin_mm, t, false);
+      h.evidence = std::max(dense_test(scene_, rasteriser_, h.pose, t).evidence, 0.001F);
+    });
   }
 
   /// Refined against its own render, twice; then the rendered test.
@@ -250,14 +298,14 @@ class Detecting {
     options.gate_to_mm = 2 * tolerance;
     options.edge_gate_from_px = edge_gate_px(4, 0.04);
     for (int round = 0; round < 2; ++round) {
-      rasteriser_.draw(pose.R, pose.t, scene_.pixel_mm, scene_.origin_mm, drawn);
+      rasteriser_.draw(pose.R, pose.t, scene_.pixel_mm, scene_.origin_mm, drawn, false);
       const ModelPoints points = model_points(scene_, rasteriser_, pose, drawn, 400, 160);
       candidate.information = refine(scene_, points, pose.R * centroid_ + pose.t, options, pose);
       options.gate_from_mm = options.gate_to_mm = std::max(3.5F * static_cast<float>(noise_mm_), tolerance);
       options.edge_gate_from_px = 2;
       options.single_heights = true;
     }
-    rasteriser_.draw(pose.R, pose.t, scene_.pixel_mm, scene_.origin_mm, drawn);
+    rasteriser_.draw(pose.R, pose.t, scene_.pixel_mm, scene_.origin_mm, drawn, false);
     candidate.pose = pose;
     candidate.test = dense_test(scene_, rasteriser_, pose, drawn);
     return candidate;
@@ -408,7 +456,7 @@ class Detecting {
   const SupplyBox& supply_;
   const KnowledgeBase::Impl& part_;
   const DetectorOptions& options_;
-  Rasteriser rasteriser_;
+  const Rasteriser& rasteriser_;
   Eigen::Vector3f centroid_;
   double noise_mm_ = 1, radius_mm_ = 1;
   float floor_mm_ = 0, lowest_allowed_mm_ = 0;

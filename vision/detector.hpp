@@ -26,7 +26,11 @@ struct StageSurvivors {
 };
 using StageObserver = std::function<void(const StageSurvivors&)>;
 
+/// Where hypotheses come from: what the features vote for, or every trained view at every maximum.
+enum class Search { Votes, Exhaustive };
+
 struct DetectorOptions {
+  Search search = Search::Exhaustive;
   int hypotheses_max = 16384;                         ///< Bound of the hypotheses that are tested.
   std::optional<double> noise_mm;                     ///< Expected depth noise, 1 sd; default: the knowledge base's.
   std::optional<std::chrono::milliseconds> deadline;  ///< Return the best so far.

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <mutex>
 #include <span>
 #include <string>
@@ -54,6 +55,8 @@ struct TrainedView {
   float area_mm2 = 0;
 };
 
+class Prepared;
+
 /// What is known of the part as a whole.
 struct PartFacts {
   std::string part_name;
@@ -86,6 +89,8 @@ struct KnowledgeBase::Impl : PartFacts {
   std::string name;  ///< For messages.
   mutable std::once_flag verify_once;
   mutable Expected<void, KnowledgeBaseError> verdict;
+  mutable std::once_flag prepare_once;
+  mutable std::shared_ptr<const Prepared> prepared;  ///< See prepared.hpp.
 };
 
 /// KnowledgeBase::open() behind the reading: `name` stands in the messages.

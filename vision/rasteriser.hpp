@@ -14,33 +14,38 @@ namespace binpick::vision {
 struct Template {
   int row0 = 0, col0 = 0;  ///< Of its first pixel, in the depth image; may lie outside of it.
   int rows = 0, cols = 0;
+  int stride = 0;                      ///< From row to row; pixels beyond `cols` are outside the silhouette.
   std::vector<float> top_mm;           ///< Highest surface, NaN outside the silhouette.
   std::vector<float> bottom_mm;        ///< Lowest surface.
   std::vector<std::int32_t> triangle;  ///< Of the highest surface; -1 outside.
 
   std::size_t at(int row, int col) const {
-    return static_cast<std::size_t>(row) * static_cast<std::size_t>(cols) + static_cast<std::size_t>(col);
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(stride) + static_cast<std::size_t>(col);
   }
 };
 
-/// Scan-line rasteriser for small templates: a few thousand triangles on some 50 × 50 pixels, where OSMesa's set-up
-/// and read-back would take most of the time. Same picture as the reference renderer (tests/unit/detect). Immutable:
-/// many threads may draw at once, each into its own Template.
+/// Rasteriser for small templates: a few thousand triangles on some 50 × 50 pixels, where OSMesa's set-up and read-back
+/// would take most of the time. Eight triangles are set up at once and eight pixels drawn (Pineda, 1988: half planes).
+/// Same picture as the reference renderer (tests/unit/detect). Immutable: many threads may draw at once, each into its
+/// own Template.
 class Rasteriser {
  public:
   explicit Rasteriser(const Mesh& mesh);
   /// Draws the mesh at R, t (supply from object, mm) on the grid given by pixel size and the centre of pixel (0, 0).
+  /// Without `bottoms` the lowest surface is left out where that saves time; bottom_mm is undefined then.
   void draw(const Eigen::Matrix3f& R, const Eigen::Vector3f& t, double pixel_mm, const Eigen::Vector2d& origin_mm,
-            Template& out) const;
+            Template& out, bool bottoms = true) const;
   /// Unit normal of a triangle, object frame.
   const Eigen::Vector3f& normal(std::int32_t triangle) const { return normals_[static_cast<std::size_t>(triangle)]; }
 
  private:
-  std::vector<Eigen::Vector3f> vertices_mm_;
-  std::vector<std::array<std::uint32_t, 3>> triangles_;
+  std::size_t points_ = 0;               // a multiple of eight
+  std::vector<float> vertices_mm_;       // x of all, y of all, z of all
+  std::vector<std::int32_t> triangles_;  // first corners, second corners, third corners
+  bool outward_ = false;                 // every body is closed and turns its outside out
   std::vector<Eigen::Vector3f> normals_;
 };
 
-/// The rasteriser with the face of the reference renderer.
-std::unique_ptr<DepthRenderer> make_scan_line_renderer(const Mesh& mesh);
+/// The working rasteriser with the face of the reference renderer.
+std::unique_ptr<DepthRenderer> make_working_renderer(const Mesh& mesh);
 }  // namespace binpick::vision

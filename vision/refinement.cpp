@@ -9,42 +9,39 @@ namespace binpick::vision {
 namespace {
 /// sd of an edge pixel's place, in pixels: the grid, and neighbours that share their points.
 constexpr float kEdgeNoisePx = 0.7F;
-constexpr float kEdgeCosine = 0.5F;
 /// One step goes this far at most, as one sd of a prior: keeps what is not seen where it is.
 constexpr double kStepPx = 2.0;
 constexpr double kStepRad = 0.15;
 
-float tukey(float residual, float gate) {
-  const float share = residual / gate;
-  if (std::abs(share) >= 1) return 0;
-  const float w = 1 - share * share;
-  return w * w;
+/// One more point in groups of eight; what is not there yet of the last group lies outside of any picture.
+template <std::size_t N>
+void append(std::vector<float>& groups, std::size_t index, const std::array<float, N>& values) {
+  constexpr float kNowhere = 1e9F;
+  const std::size_t lane = index % kernels::kLanes;
+  if (lane == 0) {
+    groups.resize(groups.size() + N * kernels::kLanes, 0.0F);
+    std::fill(groups.end() - N * kernels::kLanes, groups.end() - (N - 1) * kernels::kLanes, kNowhere);
+  }
+  float* group = groups.data() + groups.size() - N * kernels::kLanes;
+  for (std::size_t k = 0; k < N; ++k) group[k * kernels::kLanes + lane] = values[k];
 }
 
-struct Normal {
-  Matrix6 information = Matrix6::Zero();
-  Eigen::Matrix<double, 6, 1> gradient = Eigen::Matrix<double, 6, 1>::Zero();
-
-  /// One residual along n at p (relative to the centre of rotation).
-  void add(const Eigen::Vector3f& p, const Eigen::Vector3f& n, float residual, float weight) {
-    Eigen::Matrix<float, 6, 1> J;
-    J << n, p.cross(n);
-    const Eigen::Matrix<float, 6, 1> Jw = weight * J;
-    information.noalias() += (Jw * J.transpose()).cast<double>();
-    gradient += (Jw * residual).cast<double>();
-  }
-};
+std::size_t filled(std::size_t count) { return (count + kernels::kLanes - 1) / kernels::kLanes * kernels::kLanes; }
 }  // namespace
+
+void ModelPoints::add_surfel(const Eigen::Vector3f& p, const Eigen::Vector3f& n) {
+  append<6>(surfels, surfel_count++, {p.x(), p.y(), p.z(), n.x(), n.y(), n.z()});
+}
+void ModelPoints::add_edge(const Eigen::Vector3f& p, const Eigen::Vector2f& out) {
+  append<5>(edges, edge_count++, {p.x(), p.y(), p.z(), out.x(), out.y()});
+}
 
 ModelPoints model_points(const View& view, const Pose& pose) {
   const Eigen::Matrix3f turn = pose.R * view.R_supply_object.toRotationMatrix().transpose();
   const Eigen::Vector3f anchor = pose.R * view.anchors_object_mm.front() + pose.t;
   ModelPoints model;
-  model.surface.reserve(view.surface.size());
-  for (const SurfaceSample& sample : view.surface)
-    model.surface.push_back({anchor + turn * sample.p_mm, turn * sample.normal});
-  for (const Eigen::Vector3f& edge : view.edges_mm)
-    model.edges.push_back({anchor + turn * edge, Eigen::Vector2f::Zero()});
+  for (const SurfaceSample& sample : view.surface) model.add_surfel(anchor + turn * sample.p_mm, turn * sample.normal);
+  for (const Eigen::Vector3f& edge : view.edges_mm) model.add_edge(anchor + turn * edge, Eigen::Vector2f::Zero());
   return model;
 }
 
@@ -87,19 +84,18 @@ ModelPoints model_points(const Scene& scene, const Rasteriser& part, const Pose&
   for (std::size_t k = 0, step = thin(inner.size(), surface_max); k < inner.size(); k += step) {
     Eigen::Vector3f n = pose.R * part.normal(drawn.triangle[drawn.at(inner[k].row, inner[k].col)]);
     if (n.z() < 0) n = -n;
-    model.surface.push_back({place(inner[k]), n});
+    model.add_surfel(place(inner[k]), n);
   }
   for (std::size_t k = 0, step = thin(edges.size(), edges_max); k < edges.size(); k += step)
-    model.edges.push_back({place(edges[k]), edges[k].out});
+    model.add_edge(place(edges[k]), edges[k].out);
   return model;
 }
 
 Matrix6 refine(const Scene& scene, const ModelPoints& model, const Eigen::Vector3f& centre_supply_mm,
                const RefineOptions& options, Pose& pose) {
-  const auto per_mm = static_cast<float>(1 / scene.pixel_mm);
   const auto pixel_mm = static_cast<float>(scene.pixel_mm);
-  const Eigen::Vector2f origin = scene.origin_mm.cast<float>();
-  const Grid<float>& heights = options.single_heights ? scene.measured_mm : scene.z_mm;
+  const kernels::Table& loops = kernels::table();
+  const kernels::Picture picture = picture_of(scene, options.single_heights);
   const auto height_weight = static_cast<float>(1 / (scene.noise_mm * scene.noise_mm));
   const float edge_weight = 1 / (kEdgeNoisePx * kEdgeNoisePx * pixel_mm * pixel_mm);
 
@@ -111,51 +107,25 @@ Matrix6 refine(const Scene& scene, const ModelPoints& model, const Eigen::Vector
     const float gate = options.gate_from_mm + share * (options.gate_to_mm - options.gate_from_mm);
     const float edge_gate =
         pixel_mm * (options.edge_gate_from_px + share * (options.edge_gate_to_px - options.edge_gate_from_px));
-    Normal normal;
-    for (const ModelPoints::Surfel& surfel : model.surface) {
-      const Eigen::Vector3f arm = turn * (surfel.p - centre_supply_mm);
-      const Eigen::Vector3f p = centre_supply_mm + shift + arm;
-      const Eigen::Vector3f n = turn * surfel.n;
-      const float x = (p.x() - origin.x()) * per_mm, y = (p.y() - origin.y()) * per_mm;
-      const auto col = static_cast<int>(std::lround(x)), row = static_cast<int>(std::lround(y));
-      if (!scene.inside(row, col)) continue;
-      const float z = heights(row, col) + pixel_mm * (scene.slope_x(row, col) * (x - static_cast<float>(col)) +
-                                                      scene.slope_y(row, col) * (y - static_cast<float>(row)));
-      const float d = z - p.z();
-      if (!(std::abs(d) < 2 * gate)) continue;
-      const float residual = n.z() * d;
-      const float weight = tukey(residual, gate);
-      if (weight > 0) normal.add(arm, n, residual, weight * height_weight);
+    const Eigen::Vector3f centre = centre_supply_mm + shift;
+    const kernels::Motion motion = motion_of(turn, centre - turn * centre_supply_mm);
+    std::array<float, kernels::kNormalSums> sums{};
+    loops.match_surface(picture, motion, centre.data(), model.surfels.data(), filled(model.surfel_count), gate,
+                        height_weight, sums.data());
+    loops.match_edges(picture, motion, centre.data(), model.edges.data(), filled(model.edge_count), edge_gate,
+                      edge_weight, sums.data());
+    Eigen::Matrix<double, 6, 1> gradient;
+    for (Eigen::Index r = 0, k = 0; r < 6; ++r) {
+      for (Eigen::Index c = r; c < 6; ++c, ++k)
+        information(r, c) = information(c, r) = static_cast<double>(sums[static_cast<std::size_t>(k)]);
+      gradient[r] = static_cast<double>(sums[static_cast<std::size_t>(21 + r)]);
     }
-    for (const ModelPoints::Edge& edge : model.edges) {
-      const Eigen::Vector3f arm = turn * (edge.p - centre_supply_mm);
-      const Eigen::Vector3f p = centre_supply_mm + shift + arm;
-      const float x = (p.x() - origin.x()) * per_mm, y = (p.y() - origin.y()) * per_mm;
-      const auto col = static_cast<int>(std::lround(x)), row = static_cast<int>(std::lround(y));
-      if (!scene.inside(row, col)) continue;
-      const std::int32_t nearest = scene.nearest_edge(row, col);
-      if (nearest < 0) continue;
-      const int edge_row = nearest / scene.cols(), edge_col = nearest % scene.cols();
-      if (!(std::abs(scene.z_mm(edge_row, edge_col) - p.z()) < scene.jump_mm)) continue;
-      const Eigen::Vector2f out_scene(scene.edge_out_x(edge_row, edge_col), scene.edge_out_y(edge_row, edge_col));
-      Eigen::Vector2f out = out_scene;
-      if (edge.out.squaredNorm() > 0.5F) {
-        out = (turn.topLeftCorner<2, 2>() * edge.out).normalized();
-        if (out.dot(out_scene) < kEdgeCosine) continue;
-      }
-      const Eigen::Vector2f away(pixel_mm * (static_cast<float>(edge_col) - x),
-                                 pixel_mm * (static_cast<float>(edge_row) - y));
-      const float residual = out.dot(away);
-      const float weight = tukey(residual, edge_gate);
-      if (weight > 0) normal.add(arm, Eigen::Vector3f(out.x(), out.y(), 0), residual, weight * edge_weight);
-    }
-    information = normal.information;
     Matrix6 damped = information;
     damped.diagonal() *= 1.001;
     const double step_mm = kStepPx * scene.pixel_mm;
     damped.diagonal().head<3>().array() += 1 / (step_mm * step_mm);
     damped.diagonal().tail<3>().array() += 1 / (kStepRad * kStepRad);
-    const Eigen::Matrix<float, 6, 1> delta = damped.ldlt().solve(normal.gradient).cast<float>();
+    const Eigen::Matrix<float, 6, 1> delta = damped.ldlt().solve(gradient).cast<float>();
     if (!delta.allFinite()) break;
     const float angle = delta.tail<3>().norm();
     if (angle > 1e-9F) turn = Eigen::AngleAxisf(angle, delta.tail<3>() / angle).toRotationMatrix() * turn;

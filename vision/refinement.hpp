@@ -9,17 +9,16 @@ namespace binpick::vision {
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
 /// What of the model is matched with the scene: points of the visible surface with their normals and points of its
-/// depth edges with the direction in which the surface ends; supply axes, mm, at the pose that is refined.
-struct ModelPoints {
-  struct Surfel {
-    Eigen::Vector3f p, n;
-  };
-  struct Edge {
-    Eigen::Vector3f p;
-    Eigen::Vector2f out;  ///< Unit; zero: taken from the scene's edge.
-  };
-  std::vector<Surfel> surface;
-  std::vector<Edge> edges;
+/// depth edges with the direction in which the surface ends; supply axes, mm, at the pose that is refined. Kept by
+/// eights, as the inner loops want them.
+class ModelPoints {
+ public:
+  void add_surfel(const Eigen::Vector3f& p, const Eigen::Vector3f& n);
+  /// `out` has length 1; zero: taken from the scene's edge.
+  void add_edge(const Eigen::Vector3f& p, const Eigen::Vector2f& out);
+
+  std::vector<float> surfels, edges;  ///< Groups of 6 × 8 and 5 × 8 values.
+  std::size_t surfel_count = 0, edge_count = 0;
 };
 /// Of a view's samples at a pose near the view's own rotation.
 ModelPoints model_points(const View& view, const Pose& pose);

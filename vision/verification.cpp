@@ -4,6 +4,9 @@
 #include <array>
 #include <cmath>
 
+#include "vision/kernels.hpp"
+#include "vision/prepared.hpp"
+
 namespace binpick::vision {
 namespace {
 constexpr float kSlopeMax = 2.0F;
@@ -12,9 +15,6 @@ constexpr float kEdgeMissingWeight = 0.7F;
 constexpr float kEdgeFoundWeight = 0.3F;
 /// A contradiction beside the template's own edge may be half a pixel of pose error.
 constexpr float kBorderWeight = 0.25F;
-/// On a thin rim the error of a grid rotation alone puts a third of the samples beside it: mild here, strict when
-/// rendered.
-constexpr float kSparseContradiction = 1.0F;
 constexpr float kNormalCosine = 0.82F;  // 35 degrees
 /// The place beyond an edge at which the lower surface is looked for.
 constexpr int kBeyondPx = 2;
@@ -29,14 +29,20 @@ float drawn_at(const Template& drawn, int row, int col) {
   return drawn.top_mm[drawn.at(row, col)];
 }
 
+/// Of a triangle as it lies: the height of the supply's z axis on its normal, either side up.
+float upright(const Rasteriser& part, const Pose& pose, std::int32_t triangle) {
+  return std::abs(pose.R.row(2).dot(part.normal(triangle)));
+}
+
 Eigen::Vector3f upward_normal(const Rasteriser& part, const Pose& pose, std::int32_t triangle) {
   const Eigen::Vector3f n = pose.R * part.normal(triangle);
   return n.z() < 0 ? Eigen::Vector3f(-n) : n;
 }
 
-float slope_of(const Eigen::Vector3f& n) {
-  const float flat = std::hypot(n.x(), n.y());
-  return flat > kSlopeMax * n.z() ? kSlopeMax : flat / n.z();
+/// Rise per distance of a surface whose unit normal has this z.
+float slope_of(float nz) {
+  const float flat2 = std::max(0.0F, 1 - nz * nz);
+  return flat2 > kSlopeMax * kSlopeMax * nz * nz ? kSlopeMax : std::sqrt(flat2) / nz;
 }
 
 /// Mean second difference over two pixels of the drawn surface, as Scene::bend_mm.
@@ -54,71 +60,25 @@ float drawn_bend(const Template& drawn, int row, int col, float jump_mm) {
   return pairs >= 2 ? sum / static_cast<float>(pairs) : 0;
 }
 
-/// Sum over the samples in [first, last): explained count one less what their distance takes.
-struct SparseSum {
-  float evidence = 0;
-  int explained = 0;
-  int contradicted = 0;
-};
-
-template <class Place>
-void add_sparse(const Scene& scene, const View& view, std::size_t first, std::size_t last, float tolerance_mm,
-                const Place& place, SparseSum& sum) {
-  const auto per_mm = static_cast<float>(1 / scene.pixel_mm);
-  const Eigen::Vector2f origin = scene.origin_mm.cast<float>();
-  for (std::size_t i = first; i < last; ++i) {
-    const Eigen::Vector3f p = place(view.surface[i].p_mm);
-    const float x = (p.x() - origin.x()) * per_mm + 0.5F, y = (p.y() - origin.y()) * per_mm + 0.5F;
-    if (!(x >= 0 && y >= 0 && x < static_cast<float>(scene.cols()) && y < static_cast<float>(scene.rows()))) {
-      sum.evidence -= 1;  // outside the supply
-      ++sum.contradicted;
-      continue;
-    }
-    const float d = scene.z_mm(static_cast<int>(y), static_cast<int>(x)) - p.z();
-    if (std::abs(d) <= tolerance_mm) {
-      const float share = d / tolerance_mm;
-      sum.evidence += 1 - 0.7F * share * share;
-      ++sum.explained;
-    } else if (d < 0) {
-      sum.evidence -= kSparseContradiction;
-      ++sum.contradicted;
-    }
-  }
-}
-
-template <class Place>
-float add_edges(const Scene& scene, const View& view, const Place& place) {
-  if (view.edges_mm.empty()) return 0;
-  const auto per_mm = static_cast<float>(1 / scene.pixel_mm);
-  const Eigen::Vector2f origin = scene.origin_mm.cast<float>();
-  float found = 0;
-  for (const Eigen::Vector3f& edge : view.edges_mm) {
-    const Eigen::Vector3f p = place(edge);
-    const auto col = static_cast<int>(std::lround((p.x() - origin.x()) * per_mm));
-    const auto row = static_cast<int>(std::lround((p.y() - origin.y()) * per_mm));
-    if (!scene.inside(row, col) || scene.nearest_edge(row, col) < 0) continue;
-    const std::int32_t at = scene.nearest_edge(row, col);
-    const float z = scene.z_mm(at / scene.cols(), at % scene.cols());
-    if (std::abs(z - p.z()) < scene.jump_mm) found += std::max(0.0F, 1 - scene.edge_distance_px(row, col) / 5.0F);
-  }
-  return found / static_cast<float>(view.edges_mm.size());
-}
-
-template <class Place>
-float sparse(const Scene& scene, const View& view, float tolerance_mm, const Place& place) {
+float sparse(const Scene& scene, const KnowledgeBase::Impl& part, std::size_t view, float tolerance_mm,
+             const kernels::Motion& motion) {
   constexpr std::size_t kFirst = 16;
   constexpr float kHopeless = -1;
-  const std::size_t n = view.surface.size();
+  const std::span<const float> points = prepared(part).surface(view), edges = prepared(part).edges(view);
+  const std::size_t n = points.size() / 3, first = std::min(n, kFirst);
   if (n == 0) return kHopeless;
-  SparseSum sum;
-  add_sparse(scene, view, 0, std::min(kFirst, n), tolerance_mm, place, sum);
-  if (n > kFirst) {
+  const kernels::Picture picture = picture_of(scene, false);
+  kernels::SparseSum sum;
+  kernels::table().sparse(picture, motion, points.data(), first, tolerance_mm, sum);
+  if (n > first) {
     if (sum.explained < 4 || sum.contradicted > 8) return kHopeless;
-    add_sparse(scene, view, kFirst, n, tolerance_mm, place, sum);
+    kernels::table().sparse(picture, motion, points.data() + 3 * first, n - first, tolerance_mm, sum);
   }
   if (sum.evidence <= 0) return kHopeless;
-  const float pixels = view.area_mm2 / static_cast<float>(scene.pixel_mm * scene.pixel_mm);
-  return pixels * (sum.evidence / static_cast<float>(n) + 0.3F * add_edges(scene, view, place));
+  const std::size_t m = edges.size() / 3;
+  const float found = m == 0 ? 0 : kernels::table().edges(picture, motion, edges.data(), m) / static_cast<float>(m);
+  const float pixels = part.views[view].area_mm2 / static_cast<float>(scene.pixel_mm * scene.pixel_mm);
+  return pixels * (sum.evidence / static_cast<float>(n) + 0.3F * found);
 }
 }  // namespace
 
@@ -133,15 +93,44 @@ float tolerance_of(const Scene& scene) {
   return static_cast<float>(std::max(1.5 * scene.noise_mm, 0.35 * scene.pixel_mm));
 }
 
-float sparse_evidence(const Scene& scene, const View& view, const Eigen::Vector3f& p_supply, float tolerance_mm) {
-  return sparse(scene, view, tolerance_mm, [&](const Eigen::Vector3f& p) -> Eigen::Vector3f { return p_supply + p; });
+kernels::Motion motion_of(const Eigen::Matrix3f& turn, const Eigen::Vector3f& shift) {
+  kernels::Motion motion;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) motion.turn[3 * r + c] = turn(r, c);
+    motion.shift[r] = shift[r];
+  }
+  return motion;
 }
 
-float sparse_evidence(const Scene& scene, const View& view, const Pose& pose, float tolerance_mm) {
-  const Eigen::Matrix3f turn = pose.R * view.R_supply_object.toRotationMatrix().transpose();
-  const Eigen::Vector3f anchor = pose.R * view.anchors_object_mm.front() + pose.t;
-  return sparse(scene, view, tolerance_mm,
-                [&](const Eigen::Vector3f& p) -> Eigen::Vector3f { return anchor + turn * p; });
+kernels::Picture picture_of(const Scene& scene, bool single_heights) {
+  kernels::Picture picture;
+  picture.z_mm = single_heights ? scene.measured_mm.data() : scene.z_mm.data();
+  picture.slope_x = scene.slope_x.data();
+  picture.slope_y = scene.slope_y.data();
+  picture.nearest_edge = scene.nearest_edge.data();
+  picture.edge_distance_px = scene.edge_distance_px.data();
+  picture.edge_z_mm = scene.z_mm.data();
+  picture.edge_out_x = scene.edge_out_x.data();
+  picture.edge_out_y = scene.edge_out_y.data();
+  picture.rows = scene.rows();
+  picture.cols = scene.cols();
+  picture.origin_x = static_cast<float>(scene.origin_mm.x());
+  picture.origin_y = static_cast<float>(scene.origin_mm.y());
+  picture.pixel_mm = static_cast<float>(scene.pixel_mm);
+  picture.jump_mm = scene.jump_mm;
+  return picture;
+}
+
+float sparse_evidence(const Scene& scene, const KnowledgeBase::Impl& part, std::size_t view,
+                      const Eigen::Vector3f& p_supply, float tolerance_mm) {
+  return sparse(scene, part, view, tolerance_mm, motion_of(Eigen::Matrix3f::Identity(), p_supply));
+}
+
+float sparse_evidence(const Scene& scene, const KnowledgeBase::Impl& part, std::size_t view, const Pose& pose,
+                      float tolerance_mm) {
+  const View& seen = part.views[view];
+  const Eigen::Matrix3f turn = pose.R * seen.R_supply_object.toRotationMatrix().transpose();
+  return sparse(scene, part, view, tolerance_mm, motion_of(turn, pose.R * seen.anchors_object_mm.front() + pose.t));
 }
 
 float DenseTest::visible_fraction() const {
@@ -168,7 +157,7 @@ std::vector<PixelState> compare(const Scene& scene, const Rasteriser& part, cons
         continue;
       }
       const float d = scene.z_mm(row, col) - drawn.top_mm[i];
-      const float limit = tolerance + per_slope * slope_of(upward_normal(part, pose, drawn.triangle[i]));
+      const float limit = tolerance + per_slope * slope_of(upright(part, pose, drawn.triangle[i]));
       states[i] = std::abs(d) <= limit ? PixelState::Explained
                   : d < 0              ? PixelState::Contradicted
                                        : PixelState::Occluded;
@@ -214,7 +203,7 @@ DenseTest dense_test(const Scene& scene, const Rasteriser& part, const Pose& pos
           ++test.explained;
           const Eigen::Vector3f n = upward_normal(part, pose, drawn.triangle[i]);
           const float d = scene.z_mm(row, col) - z;
-          const float share = d / (tolerance + per_slope * slope_of(n));
+          const float share = d / (tolerance + per_slope * slope_of(n.z()));
           weight += 1 - share * share;
           if (border) break;
           const Eigen::Vector3f seen =

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 
+#include "vision/kernels.hpp"
 #include "vision/knowledge_base_impl.hpp"
 #include "vision/rasteriser.hpp"
 #include "vision/scene.hpp"
@@ -19,11 +20,17 @@ struct Pose {
 /// 1.5 sd of the noise (the surface is smoothed over 9 pixels), or the height of a third of a pixel.
 float tolerance_of(const Scene& scene);
 
+/// The scene as the inner loops see it, with its single heights or its smoothed surface. Lives as long as the scene.
+kernels::Picture picture_of(const Scene& scene, bool single_heights);
+kernels::Motion motion_of(const Eigen::Matrix3f& turn, const Eigen::Vector3f& shift);
+
 /// Test of a view on its scattered sample points only: what it explains less what it contradicts, in pixels of the
 /// whole silhouette. `p_supply` is the place of the view's first anchor.
-float sparse_evidence(const Scene& scene, const View& view, const Eigen::Vector3f& p_supply, float tolerance_mm);
+float sparse_evidence(const Scene& scene, const KnowledgeBase::Impl& part, std::size_t view,
+                      const Eigen::Vector3f& p_supply, float tolerance_mm);
 /// The same for a pose that has left the view's own rotation.
-float sparse_evidence(const Scene& scene, const View& view, const Pose& pose, float tolerance_mm);
+float sparse_evidence(const Scene& scene, const KnowledgeBase::Impl& part, std::size_t view, const Pose& pose,
+                      float tolerance_mm);
 
 /// A pose, rendered and compared pixel by pixel with the measured surface.
 struct DenseTest {

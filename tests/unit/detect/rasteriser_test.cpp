@@ -30,7 +30,7 @@ Eigen::Isometry3d random_pose(std::mt19937& random) {
 TEST(Rasteriser, DrawsWhatTheReferenceRendererDraws) {
   const Mesh mesh = shapes::bracket();
   const auto reference = make_osmesa_renderer(mesh);
-  const auto own = make_scan_line_renderer(mesh);
+  const auto own = make_working_renderer(mesh);
   std::mt19937 random{11};
   for (int k = 0; k < 40; ++k) {
     const Eigen::Isometry3d T = random_pose(random);

@@ -1,0 +1,97 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+/// The inner loops of detection. They are compiled twice, for any x86-64 and for one with AVX2 and FMA, and chosen when
+/// the program runs. Plain arrays only: an inline function of another header that were compiled with AVX2 here could be
+/// the copy that the linker keeps for all.
+namespace binpick::vision::kernels {
+/// Points in groups of eight lie in memory as x x x x x x x x, y …; `n` is a multiple of eight.
+inline constexpr std::size_t kLanes = 8;
+
+/// Picture as the loops see it: row-major, `cols` values in a row.
+struct Picture {
+  const float* z_mm = nullptr;
+  const float* slope_x = nullptr;
+  const float* slope_y = nullptr;
+  const std::int32_t* nearest_edge = nullptr;  ///< Index of the nearest edge pixel, -1: none near.
+  const float* edge_distance_px = nullptr;
+  const float* edge_z_mm = nullptr;  ///< Heights that edges are compared with.
+  const float* edge_out_x = nullptr;
+  const float* edge_out_y = nullptr;
+  int rows = 0, cols = 0;
+  float origin_x = 0, origin_y = 0;  ///< Supply x, y of the centre of pixel (0, 0), mm.
+  float pixel_mm = 1;
+  float jump_mm = 1;
+};
+
+/// p_supply = turn · p + shift; row-major.
+struct Motion {
+  float turn[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  float shift[3] = {0, 0, 0};
+};
+
+struct SparseSum {
+  float evidence = 0;
+  int explained = 0;
+  int contradicted = 0;
+};
+
+/// Upper triangle of the normal equations' matrix by rows (21), then its right side (6).
+inline constexpr std::size_t kNormalSums = 27;
+
+/// What a mesh is drawn on: pixel (row, col) is [row * stride + col]; stride is at least cols + kLanes.
+struct Canvas {
+  float* top_mm = nullptr;           ///< Starts at -infinity.
+  float* bottom_mm = nullptr;        ///< Starts at +infinity.
+  std::int32_t* triangle = nullptr;  ///< Of the top surface.
+  int rows = 0, cols = 0, stride = 0;
+};
+/// Which of the canvas's surfaces a triangle may belong to.
+enum class Faces { Both, Top, ByOrientation };
+
+/// A view (below 2^24) that passed the coarse test: the larger, the better; equal ones in the order of the views.
+constexpr std::uint32_t ranked(std::uint32_t view, int explained, int contradicted) {
+  return static_cast<std::uint32_t>(32 + 2 * explained - contradicted) << 24 | (0xFFFFFFU - view);
+}
+constexpr std::uint32_t view_of(std::uint32_t rank) { return 0xFFFFFFU - (rank & 0xFFFFFFU); }
+
+struct Table {
+  const char* name;
+
+  /// Views first … last - 1 at one place: `offsets` (index differences in `padded`, which must be valid for all of
+  /// them) and `rise_mm` hold 16 samples per view. Writes ranked(view, …) of the views with at least `explained_min`
+  /// samples within `tolerance_mm` and at most `contradicted_max` seen through; returns how many.
+  std::size_t (*coarse)(const float* padded, const std::int32_t* offsets, const float* rise_mm, std::size_t first,
+                        std::size_t last, float z_mm, float tolerance_mm, int explained_min, int contradicted_max,
+                        std::uint32_t* passed);
+
+  /// Adds what n samples say: explained count 1 less 0.7 of their squared share of the tolerance, seen through or
+  /// outside the picture -1.
+  void (*sparse)(const Picture& picture, const Motion& motion, const float* points, std::size_t n, float tolerance_mm,
+                 SparseSum& sum);
+  /// Sum over n edge points of how near the next edge of their height is: 1 there, 0 five pixels away.
+  float (*edges)(const Picture& picture, const Motion& motion, const float* points, std::size_t n);
+
+  /// Point-to-plane residuals of n surfels (x, y, z and normal x, y, z, by eights), Tukey weights times `weight`.
+  /// `motion` moves them; `arm_from` is the centre of rotation, supply.
+  void (*match_surface)(const Picture& picture, const Motion& motion, const float* arm_from, const float* surfels,
+                        std::size_t n, float gate_mm, float weight, float* sums);
+  /// Residuals of n edge points (x, y, z and out x, y, by eights; out of zero: the scene's) across the nearest edge.
+  void (*match_edges)(const Picture& picture, const Motion& motion, const float* arm_from, const float* edges,
+                      std::size_t n, float gate_mm, float weight, float* sums);
+
+  /// n points (x of all, y of all, z of all) moved; x and y of the low and high corner around them go to `box`.
+  void (*move_points)(const Motion& motion, const float* points, std::size_t n, float* moved, float* box);
+  /// Draws triangles, given by the indices of their corners (all first corners, all second, all third; `count` is a
+  /// multiple of eight) into n points in pixels of the canvas.
+  void (*draw)(const Canvas& canvas, const float* points, std::size_t n, const std::int32_t* corners, std::size_t count,
+               Faces faces);
+};
+
+/// Best for this processor.
+const Table& table();
+/// For comparisons: the portable one.
+const Table& portable();
+}  // namespace binpick::vision::kernels

@@ -1,0 +1,10 @@
+#include "vision/kernels.hpp"
+
+/// The inner loops for any x86-64 processor.
+namespace binpick::vision::kernels {
+namespace {
+#include "vision/kernels_body.inc"
+}  // namespace
+extern const Table kPortable;
+const Table kPortable{"portable", &coarse, &sparse, &edges, &match_surface, &match_edges, &move_points, &draw};
+}  // namespace binpick::vision::kernels
