@@ -32,7 +32,7 @@ std::string to_toml(const CellFile& file) {
       << "\nT_pivot_scanner = { xyz_mm = [60, 0, 0], rpy_deg = [180, -90, 0] }\n\n"
       << "[robot]\ndialect = \"ur\"\nsilence_max_s = 5\nlisten = \""
       << (file.robot_port == 0 ? "" : "127.0.0.1:" + std::to_string(file.robot_port)) << "\"\nallow = []\n\n"
-      << "[reach]\ntilt_max_deg = " << file.tilt_max_deg << "\n\n[detection]\nthreads = 2\ndeadline_ms = 3000\n\n"
+      << "[reach]\ntilt_max_deg = " << file.tilt_max_deg << "\n\n[detection]\nthreads = 2\ndeadline_ms = 4500\n\n"
       << "[[supply]]\nid = 1\nname = \"lattice box\"\nsize_mm = [1000, 800, 500]\n"
       << "T_base_supply = { xyz_mm = [1200, 0, 0], rpy_deg = [0, 0, 0] }\nsweep_start_deg = -15\nsweep_end_deg = 15\n"
       << "sweep_speed_deg_s = " << file.sweep_speed_deg_s << "\n";

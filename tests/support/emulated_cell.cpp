@@ -140,6 +140,10 @@ void EmulatedCell::pump() {
       if (auto request = cell_->take_detect_request()) {
         ++sweeps_;
         last_image_ = request->image;
+        // Detection reads the wall clock, of which there is none here: under a sanitizer it would end without a result.
+        auto unhurried = std::make_shared<daemon::CellData>(*request->cell);
+        unhurried->config.detection.deadline = std::chrono::hours(1);
+        request->cell = std::move(unhurried);
         looking_ = daemon::run_detection(*request);
         looked_at_ = now_ + detection_time;
         results_.push_back(*looking_);
