@@ -207,6 +207,12 @@ const std::vector<Section<Config>>& cell_sections() {
            {{.name = "deadline_ms", .type = Integer, .unit = "ms", .min = 100, .max = 60000, .default_value = "3000",
              .help = "After this the best found so far is answered. Shorter than plc.detect_timeout_ms."},
             [](C& c) -> Slot { return &c.detection.deadline; }},
+           {{.name = "search", .type = Choice, .default_value = "\"exhaustive\"",
+             .choices = {"exhaustive", "votes"},
+             .help = "exhaustive: every trained view is tried at every maximum; votes: only what the features vote for."},
+            [](C& c) -> Slot {
+              return chosen(c.detection.search, {vision::Search::Exhaustive, vision::Search::Votes});
+            }},
        }},
   };
   return sections;

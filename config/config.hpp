@@ -12,6 +12,7 @@
 #include "drivers/robot/session.hpp"
 #include "drivers/scanner/lms400/session.hpp"
 #include "plc/session.hpp"
+#include "vision/detector.hpp"
 #include "vision/grasp.hpp"
 #include "vision/knowledge_base.hpp"
 #include "vision/registration.hpp"
@@ -50,6 +51,7 @@ struct Recipe {
 struct Detection {
   int threads = 2;
   std::chrono::milliseconds deadline{3000};
+  vision::Search search = vision::Search::Exhaustive;
 };
 
 struct Config {

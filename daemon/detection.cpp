@@ -21,6 +21,7 @@ DetectResult look(const DetectRequest& request) {
   vision::DetectorOptions options;
   options.threads = config.detection.threads;
   options.deadline = config.detection.deadline;
+  options.search = config.detection.search;
 
   DetectResult result;
   result.report = vision::detect(request.image, box, part, options);

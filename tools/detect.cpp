@@ -18,6 +18,7 @@ namespace {
 struct DetectArguments {
   std::string part, scene, json, image;
   int max = 0, repeat = 1, threads = 2;
+  bool votes = false;
   int deadline_ms = 0;
 };
 
@@ -103,6 +104,7 @@ int run(const DetectArguments& arguments) {
 
   vision::DetectorOptions options;
   options.threads = arguments.threads;
+  options.search = arguments.votes ? vision::Search::Votes : vision::Search::Exhaustive;
   options.detections_max = arguments.max;
   if (arguments.deadline_ms > 0) options.deadline = std::chrono::milliseconds{arguments.deadline_ms};
 
@@ -162,6 +164,8 @@ void add_detect(CLI::App& app, int& exit_status) {
       ->check(CLI::Range(1, 100'000));
   command->add_option("--threads", arguments->threads, "threads; the result does not depend on it (default: 2)")
       ->check(CLI::Range(1, 64));
+  command->add_flag("--votes", arguments->votes,
+                    "try what the features vote for only, not every view at every maximum");
   command->add_option("--deadline-ms", arguments->deadline_ms, "answer the best found until then")
       ->check(CLI::Range(1, 3'600'000));
   command->callback([arguments, &exit_status] { exit_status = run(*arguments); });
