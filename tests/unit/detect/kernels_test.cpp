@@ -164,7 +164,8 @@ TEST(Kernels, CoarseTestCountsSamples) {
     }
   for (const Table* loops : {&portable(), &table()}) {
     std::array<std::uint32_t, 3> passed{};
-    ASSERT_EQ(loops->coarse(&flat[32], offsets.data(), rise.data(), 0, 3, 10, 1, 8, 8, passed.data()), 2U) << loops->name;
+    ASSERT_EQ(loops->coarse(&flat[32], offsets.data(), rise.data(), 0, 3, 10, 1, 8, 8, passed.data()), 2U)
+        << loops->name;
     EXPECT_EQ(view_of(passed[0]), 0U);
     EXPECT_EQ(view_of(passed[1]), 1U);
     EXPECT_GT(passed[0], passed[1]) << "the better one";
