@@ -220,6 +220,7 @@ DenseTest dense_test(const Scene& scene, const Rasteriser& part, const Pose& pos
         }
         case PixelState::Contradicted:
           ++test.contradicted;
+          test.contradicted_border += border;
           contradiction += border ? kBorderWeight : 1.0F;
           break;
         case PixelState::Occluded:

@@ -34,17 +34,18 @@ float sparse_evidence(const Scene& scene, const KnowledgeBase::Impl& part, std::
 
 /// A pose, rendered and compared pixel by pixel with the measured surface.
 struct DenseTest {
-  int pixels = 0;              ///< Of the silhouette.
-  int explained = 0;           ///< Measured where the model lies.
-  int contradicted = 0;        ///< Measured below the model: seen through it.
-  int occluded = 0;            ///< Measured above the model: something lies on it.
-  int missing = 0;             ///< Not measured, or outside the picture.
-  float fit = 0;               ///< Explained pixels, each weighted by how well, over explained pixels.
-  int edges_found = 0;         ///< Depth jumps of the model that the scene has too.
-  int edges_missing = 0;       ///< Depth jumps of the model where the measured surface goes on.
-  float normal_agreement = 1;  ///< Share of explained pixels whose normals agree.
-  float bend_agreement = 1;    ///< Correlation of the curvatures; 1 where the model has none.
-  float evidence = 0;          ///< Explained less contradicted pixels and missing edges: what decides the order.
+  int pixels = 0;               ///< Of the silhouette.
+  int explained = 0;            ///< Measured where the model lies.
+  int contradicted = 0;         ///< Measured below the model: seen through it.
+  int contradicted_border = 0;  ///< Of these, beside an edge of the model: may be half a pixel of pose error.
+  int occluded = 0;             ///< Measured above the model: something lies on it.
+  int missing = 0;              ///< Not measured, or outside the picture.
+  float fit = 0;                ///< Explained pixels, each weighted by how well, over explained pixels.
+  int edges_found = 0;          ///< Depth jumps of the model that the scene has too.
+  int edges_missing = 0;        ///< Depth jumps of the model where the measured surface goes on.
+  float normal_agreement = 1;   ///< Share of explained pixels whose normals agree.
+  float bend_agreement = 1;     ///< Correlation of the curvatures; 1 where the model has none.
+  float evidence = 0;           ///< Explained less contradicted pixels and missing edges: what decides the order.
 
   float visible_fraction() const;
   float contradicted_ratio() const;
