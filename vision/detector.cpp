@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <mutex>
@@ -464,6 +465,21 @@ class Detecting {
   DetectionReport report_;
 };
 }  // namespace
+
+std::span<const std::string_view> detector_additions() {
+  static constexpr std::array<std::string_view, 11> kAdditions{"edges",
+                                                               "first look",
+                                                               "turned",
+                                                               "rooms",
+                                                               "explain away",
+                                                               "second pass",
+                                                               "all anchors",
+                                                               "normals",
+                                                               "calibrated score",
+                                                               "second refinement",
+                                                               "curvature"};
+  return kAdditions;
+}
 
 DetectionReport detect(const DepthImage& image, const SupplyBox& supply, const KnowledgeBase& part,
                        const DetectorOptions& options) {

@@ -32,13 +32,17 @@ enum class Search { Votes, Exhaustive };
 struct DetectorOptions {
   Search search = Search::Exhaustive;
   int hypotheses_max = 16384;                         ///< Bound of the hypotheses that are tested.
+  double effort = 1;                                  ///< Multiplies every cap on what goes on to the next stage.
   std::optional<double> noise_mm;                     ///< Expected depth noise, 1 sd; default: the knowledge base's.
   std::optional<std::chrono::milliseconds> deadline;  ///< Return the best so far.
   int threads = 2;                                    ///< The result does not depend on it.
   int detections_max = 0;                             ///< 0: unlimited.
   StageObserver observer;                             ///< Called after each stage; empty: nothing is done for it.
-  std::set<std::string, std::less<>> without;         ///< Additions to leave out, to see what each brings.
+  std::set<std::string, std::less<>> without;         ///< Of detector_additions(): to see what each brings.
 };
+
+/// What was added to the published method, by the names that DetectorOptions::without knows.
+std::span<const std::string_view> detector_additions();
 
 struct Detection {
   Transform<frame::Supply, frame::Object> T_supply_object;

@@ -10,6 +10,7 @@
 #include "bench/scenes/table.hpp"
 
 namespace {
+using namespace binpick;
 using namespace binpick::bench;
 
 /// "a:b" → [a, b).
@@ -28,6 +29,11 @@ void set_shard(RunSelection& selection, const std::string& text) {
   if (selection.shard >= selection.shards) throw CLI::ValidationError{"--shard", "wants I/N with I from 0 to N - 1"};
 }
 
+std::vector<std::string> additions() {
+  const auto names = vision::detector_additions();
+  return {names.begin(), names.end()};
+}
+
 void add_run_options(CLI::App& command, RunOptions& options) {
   command.add_option("--out", options.out, "folder of the run; what it has already is not run again")->required();
   command.add_option("--piles", options.piles, "folder of settled piles");
@@ -35,7 +41,8 @@ void add_run_options(CLI::App& command, RunOptions& options) {
   command.add_option("--threads", options.threads, "threads of detection");
   command.add_option("--hypotheses", options.hypotheses_max, "bound of the hypotheses");
   command.add_option("--bias-mm", options.bias_mm, "LMS 400: bias of each material, within plus and minus this");
-  command.add_option("--ablate", options.without, "leave this addition out; may be given several times");
+  command.add_option("--ablate", options.without, "leave this addition out; may be given several times")
+      ->check(CLI::IsMember(additions()));
 }
 }  // namespace
 

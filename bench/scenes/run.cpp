@@ -22,6 +22,7 @@ using SteadyClock = std::chrono::steady_clock;
 
 constexpr const char* kPeer = "opencv";
 constexpr const char* kThorough = "thorough";
+constexpr double kThoroughEffort = 8;
 
 double ms_since(SteadyClock::time_point from) {
   return std::chrono::duration<double, std::milli>(SteadyClock::now() - from).count();
@@ -101,6 +102,7 @@ vision::DetectorOptions RunOptions::detector() const {
 vision::DetectorOptions RunOptions::thorough() const {
   vision::DetectorOptions thorough = detector();
   thorough.hypotheses_max = 1 << 20;
+  thorough.effort = kThoroughEffort;
   return thorough;
 }
 
