@@ -90,8 +90,11 @@ struct Table {
                Faces faces);
 };
 
-/// Best for this processor.
+/// Best for this processor; the portable one where the environment has BINPICK_LOOPS=portable when it is first asked
+/// for.
 const Table& table();
+/// What table() is with that value of BINPICK_LOOPS; null: not set.
+const Table& chosen(const char* loops);
 /// For comparisons: the portable one.
 const Table& portable();
 }  // namespace binpick::vision::kernels

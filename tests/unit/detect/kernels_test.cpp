@@ -175,4 +175,9 @@ TEST(Kernels, CoarseTestCountsSamples) {
     EXPECT_EQ(view_of(passed[1]), 2U);
   }
 }
+
+TEST(Kernels, TheEnvironmentMayAskForThePortableLoops) {
+  EXPECT_EQ(&chosen("portable"), &portable());
+  for (const char* loops : {"", "avx512"}) EXPECT_EQ(&chosen(loops), &chosen(nullptr)) << "the fastest";
+}
 }  // namespace binpick::vision::kernels
