@@ -66,6 +66,7 @@ SceneLine to_scene(const Json& json) {
   json.at("alive").get_to(line.alive);
   if (const auto first = json.find("first"); first != json.end())
     line.first = FirstLine{first->at("time_ms"), first->at("hypotheses"), first->at("right")};
+  if (const auto memory = json.find("memory_mib"); memory != json.end()) memory->get_to(line.memory_mib);
   return line;
 }
 }  // namespace
@@ -105,6 +106,7 @@ std::string to_json(const SceneLine& line) {
   if (line.first)
     json["first"] = {
         {"time_ms", line.first->time_ms}, {"hypotheses", line.first->hypotheses}, {"right", line.first->right}};
+  if (!line.memory_mib.empty()) json["memory_mib"] = line.memory_mib;
   return json.dump();
 }
 

@@ -48,6 +48,7 @@ struct SceneLine {
   double image_ms = 0;  ///< Of it, points to depth image.
   std::map<std::string, double> stages_ms;
   std::optional<FirstLine> first;
+  std::map<std::string, double> memory_mib;  ///< Where it was measured: see memory.hpp.
   /// For each stage, in order, and truth: distance of the nearest pose still alive, in part diameters; 9 where none is
   /// near.
   std::vector<std::pair<std::string, std::vector<double>>> alive;

@@ -2,9 +2,11 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
+#include <set>
 
 #include "bench/scenes/alarms.hpp"
 #include "bench/scenes/figure7.hpp"
+#include "bench/scenes/memory.hpp"
 #include "bench/scenes/noise_truth.hpp"
 #include "bench/scenes/run.hpp"
 #include "bench/scenes/table.hpp"
@@ -34,6 +36,19 @@ std::vector<std::string> additions() {
   return {names.begin(), names.end()};
 }
 
+void add_classes(CLI::App& command, RunSelection& selection) {
+  std::vector<std::string> names;
+  for (const ClassSetting& setting : class_settings()) names.emplace_back(setting.name);
+  command.add_option("--class", selection.classes, "only these (default: all)")->check(CLI::IsMember(names));
+}
+
+void add_parts(CLI::App& command, RunSelection& selection) {
+  std::set<std::string> names{std::string{kDeepPart}};
+  for (const ClassSetting& setting : class_settings())
+    for (const std::string& name : part_names(setting.scanner)) names.insert(name);
+  command.add_option("--part", selection.parts, "only these (default: all of the class)")->check(CLI::IsMember(names));
+}
+
 void add_run_options(CLI::App& command, RunOptions& options) {
   command.add_option("--out", options.out, "folder of the run; what it has already is not run again")->required();
   command.add_option("--piles", options.piles, "folder of settled piles");
@@ -55,8 +70,8 @@ int main(int argc, char** argv) {
 
   CLI::App* run_command = app.add_subcommand("run", "detect in scenes, write one line for each");
   add_run_options(*run_command, options);
-  run_command->add_option("--class", selection.classes, "lps36hi, lps36, lms400 (default: all)");
-  run_command->add_option("--part", selection.parts, "parts (default: all of the class)");
+  add_classes(*run_command, selection);
+  add_parts(*run_command, selection);
   run_command->add_option("--split", selection.split, "tune or report");
   run_command->add_option_function<std::string>(
       "--scenes", [&](const std::string& text) { set_range(selection, text); }, "FROM:TO, numbers in the split");
@@ -76,13 +91,15 @@ int main(int argc, char** argv) {
   std::size_t alarms = 100;
   CLI::App* alarms_command = app.add_subcommand("alarms", "detections where nothing of the part is");
   add_run_options(*alarms_command, options);
-  alarms_command->add_option("--class", selection.classes, "lps36hi, lps36, lms400 (default: all)");
+  add_classes(*alarms_command, selection);
   alarms_command->add_option("--count", alarms, "scenes of each kind and class");
 
   CLI::App* table_command = app.add_subcommand("table", "print the figures of a run");
   table_command->add_option("folder", folder, "of the run")->required();
   CLI::App* noise_command = app.add_subcommand("noise", "the emulated LMS 400 looking at a table, beside a real one");
   noise_command->add_option("--cloud", cloud, "PLY file in mm to be looked at in the same way");
+  CLI::App* memory_command = app.add_subcommand("memory", "used by this program itself")->group("");
+  memory_command->add_option("request", folder)->required();
   CLI11_PARSE(app, argc, argv);
   try {
     if (*run_command) run(options, selection);
@@ -90,6 +107,7 @@ int main(int argc, char** argv) {
     if (*alarms_command) print_false_alarms(options, selection.classes, alarms);
     if (*noise_command) print_noise_truth(cloud);
     if (*table_command) print_table(folder);
+    if (*memory_command) measure_memory(folder);
   } catch (const std::exception& e) {
     std::fprintf(stderr, "bench_scenes: %s\n", e.what());
     return 1;

@@ -43,7 +43,19 @@ std::vector<std::string> part_names(ScannerClass scanner) {
   return names;
 }
 
+ClassSetting setting_of(const ScenePart& part) {
+  ClassSetting setting = setting_of(part.scanner);
+  if (part.supply_mm) setting.supply_mm = *part.supply_mm;
+  return setting;
+}
+
 ScenePart scene_part(ScannerClass scanner, std::string_view name) {
+  if (name == kDeepPart) {
+    ScenePart deep = scene_part(scanner, "track_link");
+    deep.pile = 80;
+    deep.supply_mm = Eigen::Vector3d{800, 600, 500};
+    return deep;
+  }
   const auto row = std::ranges::find_if(kRows, [&](const Row& r) { return r.scanner == scanner && r.name == name; });
   BINPICK_CHECK(row != kRows.end());
   const auto& examples = emulators::example_part_names();

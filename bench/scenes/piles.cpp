@@ -80,10 +80,13 @@ const Split* find_split(std::string_view name) {
 }
 
 std::vector<ObjectPose> settled_pile(const ScenePart& part, std::uint64_t seed, const std::string& folder) {
-  const ClassSetting& setting = setting_of(part.scanner);
-  const fs::path file =
-      fs::path{folder} / (part.body.name + "-" + std::string{setting.name} + "-" + std::to_string(part.pile) + "-" +
-                          hex(vision::mesh_hash(part.body.mesh)) + "-" + std::to_string(seed) + ".txt");
+  const ClassSetting setting = setting_of(part);
+  std::string own_supply;
+  if (part.supply_mm)
+    for (const double mm : *part.supply_mm) own_supply += "-" + std::to_string(std::lround(mm));
+  const fs::path file = fs::path{folder} / (part.body.name + "-" + std::string{setting.name} + own_supply + "-" +
+                                            std::to_string(part.pile) + "-" + hex(vision::mesh_hash(part.body.mesh)) +
+                                            "-" + std::to_string(seed) + ".txt");
   std::vector<ObjectPose> poses = read_poses(file, static_cast<std::size_t>(part.pile));
   if (!poses.empty()) return poses;
   const emulators::World world = emulators::make_pile(part.body, part.pile, setting.supply_mm, seed);

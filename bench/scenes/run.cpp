@@ -11,9 +11,12 @@
 
 #include "bench/scenes/classes.hpp"
 #include "bench/scenes/commit.hpp"
+#include "bench/scenes/memory.hpp"
 #include "bench/scenes/opencv_peer.hpp"
+#include "bench/scenes/run_file.hpp"
 #include "bench/scenes/scanners.hpp"
 #include "bench/scenes/stage_recall.hpp"
+#include "vision/kernels.hpp"
 
 namespace binpick::bench {
 namespace {
@@ -35,20 +38,20 @@ class PartRun {
       : options_{options},
         part_{scene_part(setting.scanner, name)},
         judge_{part_},
-        base_{knowledge_base_of(part_, (fs::path{options.bases.empty() ? options.out + "/bases" : options.bases} /
-                                        (std::string{setting.name} + "-" + name + ".kb"))
-                                           .string())} {}
+        base_file_{options.base_file(part_)},
+        base_{knowledge_base_of(part_, base_file_)} {}
 
-  /// By each of the detectors; `done` gets their lines.
+  /// By each of the contenders; `done` gets their lines.
   template <class Done>
-  void scene(const Split& split, std::size_t number, const std::vector<SceneLine>& wanted, const Done& done) {
+  void scene(const Split& split, std::size_t number, const std::vector<std::pair<SceneLine, const Contender*>>& wanted,
+             const Done& done) {
     const SceneId id = split.scene(number);
     const auto begin = SteadyClock::now();
     const std::vector<ObjectPose> pile = taken_down(settled_pile(part_, id.pile, options_.piles), id.fill);
     const double settled_ms = ms_since(begin);
     const Scene scene = make_scene(part_, pile, id, options_.bias_mm);
     const double scanned_ms = ms_since(begin) - settled_ms;
-    for (SceneLine line : wanted) {
+    for (auto [line, contender] : wanted) {
       line.pile = id.pile;
       line.fill = id.fill;
       if (line.detector == kPeer) {
@@ -56,9 +59,10 @@ class PartRun {
         for (const Truth& t : scene.truths) line.truths.push_back({t.T_supply_object.iso, t.visible, t.told});
         peer_->detect(scene.points, line);
       } else {
-        detect_scene(scene, judge_, base_, line.detector == kThorough ? options_.thorough() : options_.detector(),
-                     line);
+        detect_scene(scene, judge_, base_, contender->options, line);
       }
+      if (contender->memory && number == 0)
+        line.memory_mib = memory_mib(scene, base_file_, contender->options, options_.out);
       const Match m = match(judge_.judged(line), 0);
       std::printf("%s: %zu objects, %d to find, %d right, %d wrong; %.0f ms (pile %.1f s, scan %.2f s)\n",
                   line.key().c_str(), line.truths.size(), m.to_find, m.right, m.wrong, line.time_ms, settled_ms / 1000,
@@ -72,6 +76,7 @@ class PartRun {
   const RunOptions& options_;
   ScenePart part_;
   Judge judge_;
+  std::string base_file_;
   vision::KnowledgeBase base_;
   std::unique_ptr<OpencvPeer> peer_;  // trained when its first scene comes
 };
@@ -88,7 +93,13 @@ RunHeader RunOptions::header() const {
   if (hypotheses_max > 0) header.options["hypotheses"] = std::to_string(hypotheses_max);
   if (bias_mm != 0) header.options["bias_mm"] = std::to_string(bias_mm);
   for (const std::string& name : without) header.options["without"] += name + ';';
+  const std::string loops = vision::kernels::table().name;
+  if (loops == vision::kernels::portable().name && !loops_in_names) header.options["loops"] = loops;
   return header;
+}
+
+std::string RunOptions::base_file(const ScenePart& part) const {
+  return (bases.empty() ? out + "/bases" : bases) + "/" + setting_of(part).name.data() + "-" + part.body.name + ".kb";
 }
 
 vision::DetectorOptions RunOptions::detector() const {
@@ -107,13 +118,13 @@ vision::DetectorOptions RunOptions::thorough() const {
 }
 
 Scene make_scene(const ScenePart& part, const std::vector<ObjectPose>& poses, const SceneId& id, double bias_mm) {
-  const ClassSetting& setting = setting_of(part.scanner);
+  const ClassSetting setting = setting_of(part);
   emulators::World world{setting.supply_mm};
   const auto mesh = std::make_shared<const emulators::RayMesh>(part.body.mesh);
   for (const ObjectPose& pose : poses) world.add(part.body.name, mesh, pose);
   const std::vector<Profile> lines = sweep_lines(setting, id.noise);
   const auto ideal = ideal_sweep(setting, lines, world);
-  return {id, truths_of(part, setting, lines, ideal, world),
+  return {id, setting.supply_mm, truths_of(part, setting, lines, ideal, world),
           measured_points(setting, lines, ideal, world, {id.noise, bias_mm})};
 }
 
@@ -135,16 +146,21 @@ vision::KnowledgeBase knowledge_base_of(const ScenePart& part, const std::string
   return std::move(*trained);
 }
 
+vision::DepthImage depth_image_of(const std::vector<Eigen::Vector3f>& points, const vision::KnowledgeBase& base,
+                                  const vision::SupplyBox& supply) {
+  const vision::DepthWindow window = vision::window_of(supply);
+  vision::DepthImageBuilder builder{base.pixel_mm(), window.min_mm, window.max_mm};
+  builder.add(points);
+  return builder.image();
+}
+
 void detect_scene(const Scene& scene, const Judge& judge, const vision::KnowledgeBase& base,
                   vision::DetectorOptions options, SceneLine& line) {
   StageRecall recall{judge, scene.truths, base};
   options.observer = [&](const vision::StageSurvivors& alive) { recall(alive); };
   const auto begin = SteadyClock::now();
-  const vision::SupplyBox supply{setting_of(base.scanner()).supply_mm};
-  const vision::DepthWindow window = vision::window_of(supply);
-  vision::DepthImageBuilder builder{base.pixel_mm(), window.min_mm, window.max_mm};
-  builder.add(scene.points);
-  const vision::DepthImage image = builder.image();
+  const vision::SupplyBox supply{scene.supply_mm};
+  const vision::DepthImage image = depth_image_of(scene.points, base, supply);
   line.image_ms = ms_since(begin);
   const vision::DetectionReport report = vision::detect(image, supply, base, options);
 
@@ -165,45 +181,43 @@ void detect_scene(const Scene& scene, const Judge& judge, const vision::Knowledg
                            judge.nearest_mm(report.first->T_supply_object.iso, scene.truths) < judge.threshold_mm()};
 }
 
-void run(const RunOptions& options, const RunSelection& selection) {
+void run(const RunOptions& options, const RunSelection& selection, const std::vector<Contender>& contenders) {
   const Split* split = find_split(selection.split);
   if (split == nullptr) throw std::runtime_error{"no split \"" + selection.split + "\"; there are tune and report"};
-  if (options.peer_scenes > 0 && !OpencvPeer::built())
-    throw std::runtime_error{"built without OpenCV's surface_matching; .ci/install bench, configure and build again"};
-  const RunHeader header = options.header();
-  const RunFolder before = read_run(options.out);
-  if (before.header && *before.header != header)
-    throw std::runtime_error{options.out + ": holds a run made as " + to_json(*before.header) + ", this one is " +
-                             to_json(header) + "; use another folder"};
-  fs::create_directories(options.out);
-  const std::string file = options.out + "/" + split->name.data() + "-" + std::to_string(selection.shard) + "of" +
-                           std::to_string(selection.shards) + ".jsonl";
-  std::ofstream out{file, std::ios::app};
-  out << '\n' << to_json(header) << '\n' << std::flush;
-  for (const ClassSetting& setting : class_settings())
-    for (const std::string& name : part_names(setting.scanner)) {
-      if (!wanted(selection.classes, setting.name) || !wanted(selection.parts, name)) continue;
+  RunFile file{options.out, options.header(), shard_name(selection.split, selection.shard, selection.shards)};
+  for (const ClassSetting& setting : class_settings()) {
+    if (!wanted(selection.classes, setting.name)) continue;
+    std::vector<std::string> names = part_names(setting.scanner);
+    if (setting.scanner == vision::ScannerClass::Lms400 && !selection.parts.empty()) names.emplace_back(kDeepPart);
+    for (const std::string& name : names) {
+      if (!wanted(selection.parts, name)) continue;
       std::optional<PartRun> part;  // trained when the first scene asks for it
       for (std::size_t number = selection.from; number < std::min(selection.to, split->scenes()); ++number) {
         if (number % selection.shards != selection.shard) continue;
-        std::vector<SceneLine> missing;
-        for (const auto& [detector, until] : {std::pair{"binpick", selection.to}, std::pair{kPeer, options.peer_scenes},
-                                              std::pair{kThorough, options.thorough_scenes}}) {
+        std::vector<std::pair<SceneLine, const Contender*>> missing;
+        for (const Contender& contender : contenders) {
           SceneLine line;
-          line.detector = detector;
+          line.detector = contender.name;
           line.scanner = setting.name;
           line.part = name;
           line.split = split->name;
           line.number = number;
-          if (number < until && !before.scenes.contains(line.key())) missing.push_back(std::move(line));
+          if (number < contender.scenes && !file.has(line)) missing.emplace_back(std::move(line), &contender);
         }
         if (missing.empty()) continue;
         if (!part) part.emplace(options, setting, name);
-        part->scene(*split, number, missing, [&](const SceneLine& line) {
-          out << to_json(line) << '\n' << std::flush;
-          if (!out) throw std::runtime_error{file + ": cannot be written; check folder and free space"};
-        });
+        part->scene(*split, number, missing, [&](const SceneLine& line) { file.write(line); });
       }
     }
+  }
+}
+
+void run(const RunOptions& options, const RunSelection& selection) {
+  if (options.peer_scenes > 0 && !OpencvPeer::built())
+    throw std::runtime_error{"built without OpenCV's surface_matching; .ci/install bench, configure and build again"};
+  run(options, selection,
+      {{"binpick", options.detector()},
+       {kPeer, {}, options.peer_scenes},
+       {kThorough, options.thorough(), options.thorough_scenes}});
 }
 }  // namespace binpick::bench

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -20,7 +21,9 @@ struct RunOptions {
   std::vector<std::string> without;
   std::size_t peer_scenes = 0;  ///< So many of a part's first scenes are shown to OpenCV's surface_matching as well,
   std::size_t thorough_scenes = 0;  ///< and so many to our own search with all that it can try.
+  bool loops_in_names = false;      ///< Lines say which inner loops they were made with: runs of several may mix.
   RunHeader header() const;
+  std::string base_file(const ScenePart& part) const;
   vision::DetectorOptions detector() const;
   vision::DetectorOptions thorough() const;
 };
@@ -28,6 +31,7 @@ struct RunOptions {
 /// A scene as a detector gets it, with what is true of it.
 struct Scene {
   SceneId id;
+  Eigen::Vector3d supply_mm;
   std::vector<Truth> truths;
   std::vector<Eigen::Vector3f> points;
 };
@@ -35,6 +39,9 @@ Scene make_scene(const ScenePart& part, const std::vector<ObjectPose>& poses, co
 
 /// Trained for the class, or read from `file` where it is.
 vision::KnowledgeBase knowledge_base_of(const ScenePart& part, const std::string& file);
+
+vision::DepthImage depth_image_of(const std::vector<Eigen::Vector3f>& points, const vision::KnowledgeBase& base,
+                                  const vision::SupplyBox& supply);
 
 /// Detects once and writes down what came out; `line` has its names already.
 void detect_scene(const Scene& scene, const Judge& judge, const vision::KnowledgeBase& base,
@@ -46,6 +53,15 @@ struct RunSelection {
   std::size_t from = 0, to = 1'000'000;  ///< Scenes of the split.
   std::size_t shard = 0, shards = 1;
 };
-/// Runs what the folder has not yet. Prints one line for each scene.
+/// One way of looking at the scenes; its lines bear its name.
+struct Contender {
+  std::string name;
+  vision::DetectorOptions options;
+  std::size_t scenes = std::numeric_limits<std::size_t>::max();  ///< Of a part's first ones.
+  bool memory = false;  ///< On a part's first scene: what does it take? See memory.hpp.
+};
+/// Each scene is made once and seen by all contenders that have not seen it yet. Prints a line for each.
+void run(const RunOptions& options, const RunSelection& selection, const std::vector<Contender>& contenders);
+/// Ours, and those that the options name beside it.
 void run(const RunOptions& options, const RunSelection& selection);
 }  // namespace binpick::bench

@@ -4,6 +4,8 @@
 #include <fstream>
 #include <gtest/gtest.h>
 
+#include "bench/scenes/run_file.hpp"
+
 namespace binpick::bench {
 namespace {
 namespace fs = std::filesystem;
@@ -33,6 +35,7 @@ SceneLine a_scene(std::uint64_t number) {
   line.first = FirstLine{12.5, 7, true};
   line.alive = {{"votes", {0.25}}, {"sparse test", {0.5}}};
   line.stages_ms["votes"] = 3.5;
+  line.memory_mib["peak"] = 120.5;
   return line;
 }
 
@@ -72,6 +75,7 @@ TEST_F(Folder, LinesComeBackAsTheyWere) {
   EXPECT_TRUE(line.first->right);
   EXPECT_EQ(line.alive, expected.alive);
   EXPECT_EQ(line.stages_ms, expected.stages_ms);
+  EXPECT_EQ(line.memory_mib, expected.memory_mib);
 }
 
 TEST_F(Folder, ShardsMergeAndWhatWasCutShortIsLeftOut) {
@@ -90,6 +94,20 @@ TEST_F(Folder, RunsOfTwoCommitsDoNotMix) {
   } catch (const std::runtime_error& e) {
     EXPECT_NE(std::string{e.what()}.find("1of2.jsonl:1: made as"), std::string::npos) << e.what();
   }
+}
+
+TEST_F(Folder, ARunGoesOnWhereItWasStopped) {
+  const RunHeader header{"abc", {}};
+  RunFile{folder() + "/new", header, "tune-0of2"}.write(a_scene(4));
+  const RunFile other{folder() + "/new", header, "tune-1of2"};
+  EXPECT_TRUE(other.has(a_scene(4)));
+  EXPECT_FALSE(other.has(a_scene(5)));
+  EXPECT_EQ(read_run(folder() + "/new").scenes.size(), 1U);
+}
+
+TEST_F(Folder, ARunMadeOtherwiseIsNotGoneOnWith) {
+  RunFile{folder(), {"abc", {}}, "a"};
+  EXPECT_THROW((RunFile{folder(), {"abc", {{"threads", "1"}}}, "b"}), std::runtime_error);
 }
 
 TEST_F(Folder, NothingThereIsAnEmptyRun) { EXPECT_FALSE(read_run(folder() + "/none").header); }

@@ -55,6 +55,15 @@ TEST(SceneParts, ConvexPiecesReachAsFarAsTheMesh) {
     }
 }
 
+TEST(SceneParts, ADeepSupplyIsItsOwnAndHoldsTheSamePart) {
+  const ScenePart deep = scene_part(ScannerClass::Lms400, kDeepPart),
+                  usual = scene_part(ScannerClass::Lms400, "track_link");
+  EXPECT_EQ(deep.body.name, usual.body.name) << "they share a knowledge base";
+  EXPECT_EQ(setting_of(deep).supply_mm, Eigen::Vector3d(800, 600, 500));
+  EXPECT_EQ(setting_of(usual).supply_mm, setting_of(ScannerClass::Lms400).supply_mm);
+  EXPECT_EQ(deep.pile, 80);
+}
+
 TEST(SceneParts, AShaftIsToldByItsKeywayOnly) {
   const ScenePart shaft = scene_part(ScannerClass::Lps36Hi, "keyed_shaft");
   EXPECT_TRUE(shaft.tells({3.5, 0, 0}));
