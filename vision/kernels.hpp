@@ -20,6 +20,7 @@ struct Picture {
   const float* edge_z_mm = nullptr;  ///< Heights that edges are compared with.
   const float* edge_out_x = nullptr;
   const float* edge_out_y = nullptr;
+  const float* bend_mm = nullptr;
   int rows = 0, cols = 0;
   float origin_x = 0, origin_y = 0;  ///< Supply x, y of the centre of pixel (0, 0), mm.
   float pixel_mm = 1;
@@ -50,6 +51,29 @@ struct Canvas {
 };
 /// Which of the canvas's surfaces a triangle may belong to.
 enum class Faces { Both, Top, ByOrientation };
+
+/// A template: pixel (row, col) is [row * stride + col], and lies on pixel (row + row0, col + col0) of the picture.
+/// kMargin pixels around it can be read as well, and kLanes more to the right of them.
+struct Drawn {
+  const float* top_mm = nullptr;           ///< NaN or -infinity outside the silhouette.
+  const std::int32_t* triangle = nullptr;  ///< -1 outside.
+  int rows = 0, cols = 0, stride = 0, row0 = 0, col0 = 0;
+  const float* faces = nullptr;  ///< What turn_faces() made of the normals, by triangle.
+  std::size_t faces_count = 0;   ///< A multiple of eight.
+};
+inline constexpr int kMargin = 2;
+
+struct DenseLimits {
+  float normal_cosine2 = 0;  ///< Squared cosine of the angle between normals that agree.
+  float bend_max_mm = 0;     ///< Larger curvatures count as this.
+};
+
+/// See DenseTest (verification.hpp).
+struct DenseSum {
+  int pixels = 0, explained = 0, contradicted = 0, contradicted_border = 0, occluded = 0;
+  int edges_found = 0, edges_missing = 0, normals = 0, normals_same = 0;
+  float weight = 0, bend_both = 0, bend_model = 0, bend_scene = 0;
+};
 
 /// A view (below 2^24) that passed the coarse test: the larger, the better; equal ones in the order of the views.
 constexpr std::uint32_t ranked(std::uint32_t view, int explained, int contradicted) {
@@ -88,6 +112,16 @@ struct Table {
   /// multiple of eight) into n points in pixels of the canvas.
   void (*draw)(const Canvas& canvas, const float* points, std::size_t n, const std::int32_t* corners, std::size_t count,
                Faces faces);
+
+  /// n unit normals (x of all, y of all, z of all) turned, made to look up; then how far from a surface that lies so a
+  /// height may be: the tolerance and `per_slope_mm` times the rise per distance. `faces` has room for 4 n.
+  void (*turn_faces)(const float* turn, const float* normals, std::size_t n, float tolerance_mm, float per_slope_mm,
+                     float* faces);
+  /// Compares a template with the picture.
+  void (*dense)(const Picture& picture, const Drawn& drawn, const DenseLimits& limits, DenseSum& sum);
+  /// PixelState (verification.hpp) of the template's pixels, in its layout; writes nothing about eights of a row that
+  /// are empty.
+  void (*states)(const Picture& picture, const Drawn& drawn, std::uint8_t* states);
 };
 
 /// Best for this processor; the portable one where the environment has BINPICK_LOOPS=portable when it is first asked

@@ -5,7 +5,9 @@
 namespace binpick::vision::kernels {
 namespace {
 #include "vision/kernels_body.inc"
+#include "vision/kernels_dense.inc"
 }  // namespace
 extern const Table kAvx2;
-const Table kAvx2{"avx2", &coarse, &sparse, &edges, &match_surface, &match_edges, &move_points, &draw};
+const Table kAvx2{"avx2",       &coarse, &sparse,     &edges, &match_surface, &match_edges,
+                  &move_points, &draw,   &turn_faces, &dense, &states};
 }  // namespace binpick::vision::kernels

@@ -4,7 +4,9 @@
 namespace binpick::vision::kernels {
 namespace {
 #include "vision/kernels_body.inc"
+#include "vision/kernels_dense.inc"
 }  // namespace
 extern const Table kPortable;
-const Table kPortable{"portable", &coarse, &sparse, &edges, &match_surface, &match_edges, &move_points, &draw};
+const Table kPortable{"portable",   &coarse, &sparse,     &edges, &match_surface, &match_edges,
+                      &move_points, &draw,   &turn_faces, &dense, &states};
 }  // namespace binpick::vision::kernels

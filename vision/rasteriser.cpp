@@ -9,6 +9,7 @@
 
 namespace binpick::vision {
 namespace {
+static_assert(Template::kMarginPx == kernels::kMargin);
 constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
 /// A template larger than this is a pose far out of any supply, or a pixel far too small.
 constexpr float kTemplatePixelsMax = 4096;
@@ -66,14 +67,14 @@ Rasteriser::Rasteriser(const Mesh& mesh) : outward_{turns_outward(mesh)} {
     for (std::size_t axis = 0; axis < 3; ++axis)
       vertices_mm_[axis * points_ + i] = mesh.vertices_mm[std::min(i, n - 1)][static_cast<Eigen::Index>(axis)];
   triangles_.assign(3 * count, 0);  // what fills up the last eight has no area
-  normals_.reserve(mesh.triangles.size());
+  normals_.assign(3 * count, 0.0F);
   for (std::size_t k = 0; k < mesh.triangles.size(); ++k) {
     const auto& [a, b, c] = mesh.triangles[k];
     for (std::size_t corner = 0; corner < 3; ++corner)
       triangles_[corner * count + k] = static_cast<std::int32_t>(mesh.triangles[k][corner]);
-    normals_.push_back((mesh.vertices_mm[b] - mesh.vertices_mm[a])
-                           .cross(mesh.vertices_mm[c] - mesh.vertices_mm[a])
-                           .stableNormalized());
+    const Eigen::Vector3f normal =
+        (mesh.vertices_mm[b] - mesh.vertices_mm[a]).cross(mesh.vertices_mm[c] - mesh.vertices_mm[a]).stableNormalized();
+    for (std::size_t axis = 0; axis < 3; ++axis) normals_[axis * count + k] = normal[static_cast<Eigen::Index>(axis)];
   }
 }
 
@@ -99,18 +100,27 @@ void Rasteriser::draw(const Eigen::Matrix3f& R, const Eigen::Vector3f& t, double
   out.row0 = static_cast<int>(std::ceil(box[1]));
   out.cols = std::max(0, static_cast<int>(std::floor(box[2])) - out.col0 + 1);
   out.rows = std::max(0, static_cast<int>(std::floor(box[3])) - out.row0 + 1);
-  out.stride = out.cols + static_cast<int>(kernels::kLanes);
-  const std::size_t pixels = static_cast<std::size_t>(out.rows) * static_cast<std::size_t>(out.stride);
+  if (out.rows == 0 || out.cols == 0) {
+    out.rows = out.cols = 0;
+    return;
+  }
+  out.stride = out.cols + 2 * Template::kMarginPx + static_cast<int>(kernels::kLanes);
+  const std::size_t pixels =
+      static_cast<std::size_t>(out.rows + 2 * Template::kMarginPx) * static_cast<std::size_t>(out.stride);
   out.top_mm.assign(pixels, -std::numeric_limits<float>::infinity());
   out.bottom_mm.assign(pixels, std::numeric_limits<float>::infinity());
   out.triangle.assign(pixels, -1);
-  if (pixels == 0) return;
 
   for (std::size_t i = 0; i < points_; ++i) {
     at[i] -= static_cast<float>(out.col0);
     at[points_ + i] -= static_cast<float>(out.row0);
   }
-  const kernels::Canvas canvas{out.top_mm.data(), out.bottom_mm.data(), out.triangle.data(), out.rows, out.cols,
+  const std::size_t first = out.at(0, 0);
+  const kernels::Canvas canvas{out.top_mm.data() + first,
+                               out.bottom_mm.data() + first,
+                               out.triangle.data() + first,
+                               out.rows,
+                               out.cols,
                                out.stride};
   kernels::table().draw(canvas, at.data(), points_, triangles_.data(), triangles_.size() / 3,
                         !outward_ ? kernels::Faces::Both

@@ -83,6 +83,7 @@ std::vector<Selected> select(const Scene& scene, const Rasteriser& part, const S
   };
   std::vector<Standing> standing;
   std::vector<Selected> all;
+  std::vector<PixelState> states;
   Grid<std::int32_t> owner = Grid<std::int32_t>::Constant(scene.rows(), scene.cols(), -1);
   const auto room_mm = static_cast<float>(2 * tolerance_of(scene) + 0.01 * options.diameter_mm);
 
@@ -94,7 +95,7 @@ std::vector<Selected> select(const Scene& scene, const Rasteriser& part, const S
     Selected entry{candidate, 0, own_reason(candidate.test)};
     Template drawn;
     part.draw(candidate.pose.R, candidate.pose.t, scene.pixel_mm, scene.origin_mm, drawn);
-    const std::vector<PixelState> states = compare(scene, part, candidate.pose, drawn);
+    compare(scene, part, candidate.pose, drawn, states);
     if (entry.reason.empty()) {
       std::vector<int> claims(standing.size(), 0);
       int explained = 0, claimed = 0;

@@ -52,9 +52,12 @@ struct DenseTest {
   float edge_ratio() const;
 };
 /// `drawn` is the pose's template (Rasteriser::draw).
-DenseTest dense_test(const Scene& scene, const Rasteriser& part, const Pose& pose, const Template& drawn);
+DenseTest dense_test(const Scene& scene, const Rasteriser& part, const Pose& pose, const Template& drawn,
+                     const kernels::Table& loops = kernels::table());
 
 /// How one pixel of a template compares with the scene.
 enum class PixelState : std::uint8_t { Empty, Explained, Contradicted, Occluded, Missing };
-std::vector<PixelState> compare(const Scene& scene, const Rasteriser& part, const Pose& pose, const Template& drawn);
+/// Of pixel (r, c) at drawn.at(r, c).
+void compare(const Scene& scene, const Rasteriser& part, const Pose& pose, const Template& drawn,
+             std::vector<PixelState>& states, const kernels::Table& loops = kernels::table());
 }  // namespace binpick::vision

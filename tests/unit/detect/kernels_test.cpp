@@ -29,9 +29,9 @@ struct Wavy {
         out_x.push_back(-1);
         out_y.push_back(0);
       }
-    picture = {z.data(),        slope_x.data(), slope_y.data(), edge.data(),  distance.data(),
-               z.data(),        out_x.data(),   out_y.data(),   kRows,        kCols,
-               /*origin_x=*/-5, /*origin_y=*/3, /*pixel_mm=*/2, /*jump_mm=*/6};
+    picture = {z.data(),        slope_x.data(), slope_y.data(),      edge.data(),  distance.data(), z.data(),
+               out_x.data(),    out_y.data(),   /*bend_mm=*/nullptr, kRows,        kCols,
+               /*origin_x=*/-5, /*origin_y=*/3, /*pixel_mm=*/2,      /*jump_mm=*/6};
   }
   std::vector<float> z, slope_x, slope_y, distance, out_x, out_y;
   std::vector<std::int32_t> edge;
