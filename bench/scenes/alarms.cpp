@@ -2,88 +2,83 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <filesystem>
 #include <map>
 
-#include "bench/scenes/classes.hpp"
-#include "tests/emulators/world/shapes.hpp"
-#include "tests/emulators/world/world.hpp"
+#include "bench/scenes/run_file.hpp"
 
 namespace binpick::bench {
 namespace {
-constexpr std::uint64_t kFirstPile = 9'001, kPiles = 6;
+/// What a class's wanted parts need; trained, or read, when first asked for.
+class Wanted {
+ public:
+  Wanted(const RunOptions& options, const ClassSetting& setting, const std::string& name)
+      : part_{scene_part(setting.scanner, name)},
+        judge_{part_},
+        base_{knowledge_base_of(part_, options.base_file(part_))} {}
+  const Judge& judge() const { return judge_; }
+  const vision::KnowledgeBase& base() const { return base_; }
 
-/// Bricks or bolts of about the size of the class's parts.
-ScenePart foreign_part(const ClassSetting& setting, bool bolt) {
-  const auto size = static_cast<float>(0.3 * std::min(setting.supply_mm.y(), 450.0));
-  ScenePart part;
-  part.scanner = setting.scanner;
-  part.pile = 30;
-  if (bolt) {
-    part.body.name = "bolt";
-    part.body.mesh = emulators::shapes::turn(0, {{0.2F * size, 0.25F * size, 0}, {size, 0.13F * size, 0}}, 24);
-    part.body.pieces = {emulators::cylinder_piece(0.25F * size, 0, 0.2F * size, 24),
-                        emulators::cylinder_piece(0.13F * size, 0.2F * size, size, 24)};
-  } else {
-    part.body.name = "brick";
-    const Eigen::Vector3f half = size * Eigen::Vector3f{0.45F, 0.21F, 0.14F};
-    part.body.mesh = emulators::box_mesh(2 * half.cast<double>());
-    part.body.pieces = {emulators::box_piece(-half, half)};
-  }
-  return part;
-}
-
-struct Alarms {
-  int scenes = 0, scenes_with = 0, detections = 0;
-  double highest = 0;
-  void add(const SceneLine& line) {
-    int own = 0;
-    for (const DetectionLine& d : line.detections) {
-      own += d.score > 0.5;
-      highest = std::max(highest, d.score);
-    }
-    ++scenes;
-    scenes_with += own > 0;
-    detections += own;
-  }
+ private:
+  ScenePart part_;
+  Judge judge_;
+  vision::KnowledgeBase base_;
 };
 }  // namespace
 
-void print_false_alarms(const RunOptions& options, const std::vector<std::string>& classes, std::size_t count) {
-  std::printf("| | scenes | with a detection above .5 | such detections | highest score |\n|---|---|---|---|---|\n");
+void alarms(const RunOptions& options, const RunSelection& selection, std::size_t count) {
+  const std::string split = "alarms-" + selection.split;
+  if (!is_alarm_split(split))
+    throw std::runtime_error{"no split \"" + selection.split + "\"; there are tune and report"};
+  RunFile file{options.out, options.header(), shard_name(split, selection.shard, selection.shards)};
   for (const ClassSetting& setting : class_settings()) {
-    if (!classes.empty() && std::ranges::find(classes, setting.name) == classes.end()) continue;
-    const std::vector<std::string> names = part_names(setting.scanner);
-    std::map<std::string, vision::KnowledgeBase> bases;
-    std::map<std::string, Judge> judges;
-    std::vector<ScenePart> piled;
-    for (const std::string& name : names) {
-      piled.push_back(scene_part(setting.scanner, name));
-      const std::string folder = options.bases.empty() ? options.out + "/bases" : options.bases;
-      bases.emplace(name,
-                    knowledge_base_of(piled.back(), folder + "/" + std::string{setting.name} + "-" + name + ".kb"));
-      judges.emplace(name, Judge{piled.back()});
-    }
-    const std::vector<ScenePart> foreign{foreign_part(setting, false), foreign_part(setting, true)};
-    const std::vector<double> fills{1, 0.7, 0.4, 0.2};
-    for (const char* kind : {"another part", "empty supply", "foreign bodies"}) {
-      Alarms alarms;
-      for (std::size_t k = 0; k < count; ++k) {
-        const std::string& wanted = names[k % names.size()];
-        const ScenePart& there = kind[0] == 'a' ? piled[(k + 1 + k / names.size() % (names.size() - 1)) % names.size()]
-                                                : foreign[k / names.size() % 2];
-        const SceneId id{kFirstPile + k % kPiles, fills[k / kPiles % fills.size()], kFirstPile * 1'000 + k};
-        std::vector<ObjectPose> poses;
-        if (kind[0] != 'e') poses = taken_down(settled_pile(there, id.pile, options.piles), id.fill);
-        SceneLine line;
-        detect_scene(make_scene(there, poses, id, options.bias_mm), judges.at(wanted), bases.at(wanted),
-                     options.detector(), line);
-        alarms.add(line);
-      }
-      std::printf("| %s, %s | %d | %d | %d | %.2f |\n", setting.name.data(), kind, alarms.scenes, alarms.scenes_with,
-                  alarms.detections, alarms.highest);
+    if (!selection.classes.empty() && std::ranges::find(selection.classes, setting.name) == selection.classes.end())
+      continue;
+    std::map<std::string, Wanted> wanted;
+    for (std::size_t number = 0; number < count * kAlarmKinds.size(); ++number) {
+      // By kinds together: an empty supply takes less time, and each shard has its share.
+      if (number / kAlarmKinds.size() % selection.shards != selection.shard) continue;
+      const AlarmScene alarm = alarm_scene(setting, split, number);
+      SceneLine line;
+      line.scanner = setting.name;
+      line.part = alarm.wanted;
+      line.split = split;
+      line.number = number;
+      line.pile = alarm.id.pile;
+      line.fill = alarm.empty() ? 0 : alarm.id.fill;
+      if (file.has(line)) continue;
+      const Wanted& part = wanted.try_emplace(alarm.wanted, options, setting, alarm.wanted).first->second;
+      std::vector<ObjectPose> poses;
+      if (!alarm.empty()) poses = taken_down(settled_pile(alarm.there, alarm.id.pile, options.piles), alarm.id.fill);
+      Scene scene = make_scene(alarm.there, poses, alarm.id, options.bias_mm);
+      scene.truths.clear();  // they are other parts'
+      detect_scene(scene, part.judge(), part.base(), options.detector(), line);
+      AlarmCount own;
+      own.add(line);
+      std::printf("%s: %s; %d above .5, highest %.2f\n", line.key().c_str(), kAlarmKinds[alarm.kind].data(),
+                  own.detections, own.highest);
       std::fflush(stdout);
+      file.write(line);
     }
   }
+  print_alarms(read_run(options.out), split);
+}
+
+void print_alarms(const RunFolder& run, const std::string& split) {
+  const AlarmCounts counts = alarm_counts(run, split);
+  if (counts.empty()) return;
+  std::printf(
+      "\nWhere nothing of the part is (%s): scenes with a detection above .5 / scenes, and the highest score.\n"
+      "| wanted |",
+      split.c_str());
+  for (const std::string_view kind : kAlarmKinds) std::printf(" %s |", kind.data());
+  std::printf("\n|---|");
+  for (std::size_t k = 0; k < kAlarmKinds.size(); ++k) std::printf("---|");
+  for (const auto& [scanner, parts] : counts)
+    for (const auto& [part, kinds] : parts) {
+      std::printf("\n| %s %s |", scanner.c_str(), part.c_str());
+      for (const AlarmCount& count : kinds)
+        std::printf(" %d / %d; %.2f |", count.scenes_with, count.scenes, count.highest);
+    }
+  std::printf("\n");
 }
 }  // namespace binpick::bench

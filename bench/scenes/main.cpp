@@ -36,6 +36,12 @@ std::vector<std::string> additions() {
   return {names.begin(), names.end()};
 }
 
+void add_shard(CLI::App& command, RunSelection& selection) {
+  command.add_option_function<std::string>(
+      "--shard", [&selection](const std::string& text) { set_shard(selection, text); },
+      "I/N: every N-th scene, from the I-th");
+}
+
 void add_classes(CLI::App& command, RunSelection& selection) {
   std::vector<std::string> names;
   for (const ClassSetting& setting : class_settings()) names.emplace_back(setting.name);
@@ -75,8 +81,7 @@ int main(int argc, char** argv) {
   run_command->add_option("--split", selection.split, "tune or report");
   run_command->add_option_function<std::string>(
       "--scenes", [&](const std::string& text) { set_range(selection, text); }, "FROM:TO, numbers in the split");
-  run_command->add_option_function<std::string>(
-      "--shard", [&](const std::string& text) { set_shard(selection, text); }, "I/N: every N-th scene, from the I-th");
+  add_shard(*run_command, selection);
   run_command->add_option("--peer", options.peer_scenes,
                           "the first N scenes of a part by OpenCV's surface_matching too");
   run_command->add_option("--thorough", options.thorough_scenes, "the first N scenes by our slowest search too");
@@ -85,14 +90,15 @@ int main(int argc, char** argv) {
   CLI::App* figure7_command = app.add_subcommand("figure7", "hypotheses and time to the first valid pose");
   add_run_options(*figure7_command, options);
   figure7_command->add_option("--count", count, "scenes, at most 3000");
-  figure7_command->add_option_function<std::string>(
-      "--shard", [&](const std::string& text) { set_shard(selection, text); }, "I/N: every N-th scene, from the I-th");
+  add_shard(*figure7_command, selection);
 
-  std::size_t alarms = 100;
+  std::size_t alarm_count = 100;
   CLI::App* alarms_command = app.add_subcommand("alarms", "detections where nothing of the part is");
   add_run_options(*alarms_command, options);
   add_classes(*alarms_command, selection);
-  alarms_command->add_option("--count", alarms, "scenes of each kind and class");
+  alarms_command->add_option("--count", alarm_count, "scenes of each kind and class");
+  alarms_command->add_option("--split", selection.split, "tune or report");
+  add_shard(*alarms_command, selection);
 
   CLI::App* table_command = app.add_subcommand("table", "print the figures of a run");
   table_command->add_option("folder", folder, "of the run")->required();
@@ -104,7 +110,7 @@ int main(int argc, char** argv) {
   try {
     if (*run_command) run(options, selection);
     if (*figure7_command) figure7(options, count, selection.shard, selection.shards);
-    if (*alarms_command) print_false_alarms(options, selection.classes, alarms);
+    if (*alarms_command) alarms(options, selection, alarm_count);
     if (*noise_command) print_noise_truth(cloud);
     if (*table_command) print_table(folder);
     if (*memory_command) measure_memory(folder);

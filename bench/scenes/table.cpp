@@ -7,35 +7,16 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "bench/scenes/alarms.hpp"
 #include "bench/scenes/charts.hpp"
 #include "bench/scenes/classes.hpp"
-#include "bench/scenes/figures.hpp"
+#include "bench/scenes/comparison.hpp"
+#include "bench/scenes/must.hpp"
 
 namespace binpick::bench {
 namespace {
 /// Fewer say nothing of a share.
 constexpr double kBinMin = 10;
-
-struct ClassFigures {
-  std::string name;
-  std::vector<PartFigures> parts;
-};
-
-std::string with_interval(const Estimate& estimate, const char* format) {
-  const Interval interval = estimate.interval();
-  std::array<char, 32> value{}, low{}, high{};
-  std::snprintf(value.data(), value.size(), format, estimate.value);
-  std::snprintf(low.data(), low.size(), format, interval.low);
-  std::snprintf(high.data(), high.size(), format, interval.high);
-  return std::string{value.data()} + " [" + low.data() + ", " + high.data() + "]";
-}
-
-template <class Of>
-std::vector<double> all_of(const ClassFigures& figures, const Of& of) {
-  std::vector<double> all;
-  for (const PartFigures& part : figures.parts) all.insert(all.end(), (part.*of).begin(), (part.*of).end());
-  return all;
-}
 
 double ratio(int part, int whole) { return whole > 0 ? static_cast<double>(part) / whole : 1; }
 
@@ -43,13 +24,10 @@ void print_row(const char* what, const std::vector<ClassFigures>& classes, Estim
                const char* format, bool large_is_good) {
   std::printf("| %s |", what);
   for (const ClassFigures& figures : classes) {
-    std::vector<const Estimate*> parts;
     const PartFigures* worst = nullptr;
-    for (const PartFigures& part : figures.parts) {
-      parts.push_back(&(part.*of));
+    for (const PartFigures& part : figures.parts)
       if (worst == nullptr || ((part.*of).value < (worst->*of).value) == large_is_good) worst = &part;
-    }
-    std::printf(" %s; worst %s (%s) |", with_interval(mean_of(parts), format).c_str(),
+    std::printf(" %s; worst %s (%s) |", with_interval(figures.mean(of), format).c_str(),
                 with_interval(worst->*of, format).c_str(), worst->name.c_str());
   }
   std::printf("\n");
@@ -105,12 +83,17 @@ void print_times(const std::vector<ClassFigures>& classes) {
   std::printf(
       "\n| ms | p50 | p90 | p95 | p99 | max | first valid pose p50 | p90 | p95 | p99 | depth image p50 |\n"
       "|---|---|---|---|---|---|---|---|---|---|---|\n");
-  for (const ClassFigures& figures : classes) {
-    const auto times = all_of(figures, &PartFigures::time_ms), firsts = all_of(figures, &PartFigures::first_ms);
+  ClassFigures together{"all", {}};
+  for (const ClassFigures& figures : classes)
+    together.parts.insert(together.parts.end(), figures.parts.begin(), figures.parts.end());
+  std::vector<ClassFigures> rows = classes;
+  rows.push_back(std::move(together));
+  for (const ClassFigures& figures : rows) {
+    const auto times = figures.all(&PartFigures::time_ms), firsts = figures.all(&PartFigures::first_ms);
     std::printf("| %s |", figures.name.c_str());
     for (const double q : {0.5, 0.9, 0.95, 0.99, 1.0}) std::printf(" %.0f |", quantile(times, q));
     for (const double q : {0.5, 0.9, 0.95, 0.99}) std::printf(" %.0f |", quantile(firsts, q));
-    std::printf(" %.1f |\n", quantile(all_of(figures, &PartFigures::image_ms), 0.5));
+    std::printf(" %.1f |\n", quantile(figures.all(&PartFigures::image_ms), 0.5));
   }
   std::printf("Mean ms of the stages:");
   for (const ClassFigures& figures : classes) {
@@ -138,39 +121,14 @@ void print_reliability(const std::vector<ClassFigures>& classes) {
     everywhere.insert(everywhere.end(), believed.begin(), believed.end());
     std::printf("| %s | %.3f | %.3f | %.3f | %.2f |\n", figures.name.c_str(), ratio(right, right + wrong),
                 ratio(right, to_find), calibration_error(believed),
-                quantile(all_of(figures, &PartFigures::normalised_errors), 0.5));
+                quantile(figures.all(&PartFigures::normalised_errors), 0.5));
   }
   std::printf("| all | | | %.3f | |\n", calibration_error(everywhere));
 }
 
-std::vector<ClassFigures> collected(const RunFolder& run, const std::string& detector) {
-  std::vector<ClassFigures> classes;
-  std::uint64_t stream = 0;
-  for (const ClassSetting& setting : class_settings()) {
-    ClassFigures figures{std::string{setting.name}, {}};
-    for (const std::string& name : part_names(setting.scanner)) {
-      std::vector<const SceneLine*> scenes;
-      for (const auto& [key, scene] : run.scenes)
-        if (scene.detector == detector && scene.scanner == setting.name && scene.part == name) scenes.push_back(&scene);
-      if (!scenes.empty())
-        figures.parts.push_back(figures_of_part(scene_part(setting.scanner, name), scenes, ++stream));
-    }
-    if (!figures.parts.empty()) classes.push_back(std::move(figures));
-  }
-  return classes;
-}
 /// Another detector beside ours, on those scenes only that both saw.
 void print_peer(const RunFolder& run, const std::string& detector) {
-  RunFolder common;
-  for (const auto& [key, scene] : run.scenes) {
-    if (scene.detector != detector) continue;
-    SceneLine ours = scene;
-    ours.detector = "binpick";
-    const auto it = run.scenes.find(ours.key());
-    if (it == run.scenes.end()) continue;
-    common.scenes[key] = scene;
-    common.scenes[ours.key()] = it->second;
-  }
+  const RunFolder common = seen_by_all(run, {"binpick", detector});
   if (common.scenes.empty()) return;
   const auto ours = collected(common, "binpick"), theirs = collected(common, detector);
   std::printf(
@@ -178,17 +136,12 @@ void print_peer(const RunFolder& run, const std::string& detector) {
       "binpick | times as fast |\n|---|---|---|---|---|---|---|---|---|\n",
       detector.c_str(), common.scenes.size() / 2);
   for (std::size_t c = 0; c < theirs.size(); ++c) {
-    const auto mean = [](const ClassFigures& figures, Estimate PartFigures::*of) {
-      double sum = 0;
-      for (const PartFigures& part : figures.parts) sum += (part.*of).value;
-      return sum / static_cast<double>(figures.parts.size());
-    };
-    const double ap = mean(ours[c], &PartFigures::ap), their_ap = mean(theirs[c], &PartFigures::ap);
-    const double ms = quantile(all_of(ours[c], &PartFigures::time_ms), 0.5),
-                 their_ms = quantile(all_of(theirs[c], &PartFigures::time_ms), 0.5);
+    const double ap = ours[c].mean(&PartFigures::ap).value, their_ap = theirs[c].mean(&PartFigures::ap).value;
+    const double ms = quantile(ours[c].all(&PartFigures::time_ms), 0.5),
+                 their_ms = quantile(theirs[c].all(&PartFigures::time_ms), 0.5);
     std::printf("| %s | %.3f | %.3f | %.2f | %.3f | %.3f | %.0f | %.0f | %.0f |\n", theirs[c].name.c_str(), their_ap,
-                ap, (1 - ap) / std::max(1e-9, 1 - their_ap), mean(theirs[c], &PartFigures::first_right),
-                mean(ours[c], &PartFigures::first_right), their_ms, ms, their_ms / ms);
+                ap, (1 - ap) / std::max(1e-9, 1 - their_ap), theirs[c].mean(&PartFigures::first_right).value,
+                ours[c].mean(&PartFigures::first_right).value, their_ms, ms, their_ms / ms);
   }
 }
 
@@ -217,18 +170,31 @@ void draw(const std::string& folder, const std::vector<ClassFigures>& classes) {
 }  // namespace
 
 void print_table(const std::string& folder) {
-  const RunFolder run = read_run(folder);
-  if (!run.header || run.scenes.empty())
-    throw std::runtime_error{folder + ": holds no scene; bench_scenes run --out " + folder + " makes some"};
-  std::printf("%zu scenes, %s. All of it is simulation.\n", run.scenes.size(), to_json(*run.header).c_str());
-  const std::vector<ClassFigures> classes = collected(run, "binpick");
-  print_main(classes);
-  print_parts(classes);
-  print_stages(classes);
-  print_times(classes);
-  print_reliability(classes);
+  const RunFolder all = read_run(folder);
+  RunFolder run;
+  for (const char* split : {"report", "tune"})
+    if (run.scenes.empty()) run = of_split(all, split);
+  if (!all.header || run.scenes.empty())
+    throw std::runtime_error{folder + ": holds no scene to report or to tune on; bench_scenes run --out " + folder +
+                             " makes some"};
+  const std::string& split = run.scenes.begin()->second.split;
+  std::printf("%zu scenes to %s, %s. All of it is simulation.\n", run.scenes.size(),
+              split == "tune" ? "tune on" : "report", to_json(*all.header).c_str());
+  Evidence evidence;
+  evidence.classes = collected(run, "binpick");
+  const RunFolder peer = seen_by_all(run, {"binpick", "opencv"});
+  evidence.peer = collected(peer, "opencv");
+  evidence.beside_peer = collected(peer, "binpick");
+  evidence.alarms = alarm_counts(all, "alarms-" + split);
+  print_main(evidence.classes);
+  print_parts(evidence.classes);
+  print_stages(evidence.classes);
+  print_times(evidence.classes);
+  print_reliability(evidence.classes);
   print_peer(run, "opencv");
   print_peer(run, "thorough");
-  draw(folder, classes);
+  print_alarms(all, "alarms-" + split);
+  print_standings(standings(evidence));
+  draw(folder, evidence.classes);
 }
 }  // namespace binpick::bench
