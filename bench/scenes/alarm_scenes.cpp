@@ -38,7 +38,8 @@ bool is_alarm_split(std::string_view split) { return split == kTune || split == 
 AlarmScene alarm_scene(const ClassSetting& setting, const std::string& split, std::size_t number) {
   BINPICK_CHECK(is_alarm_split(split));
   const std::vector<std::string> names = part_names(setting.scanner);
-  const std::vector<double> fills = split == kTune ? std::vector{1.0, 0.75, 0.5, 0.25} : std::vector{0.9, 0.65, 0.4, 0.2};
+  const std::vector<double> fills =
+      split == kTune ? std::vector{1.0, 0.75, 0.5, 0.25} : std::vector{0.9, 0.65, 0.4, 0.2};
   const std::uint64_t first_pile = split == kTune ? kTunePile : kReportPile;
   const std::size_t k = number / kAlarmKinds.size();
   AlarmScene scene;

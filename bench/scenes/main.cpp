@@ -4,11 +4,13 @@
 #include <exception>
 #include <set>
 
+#include "bench/scenes/ablation.hpp"
 #include "bench/scenes/alarms.hpp"
 #include "bench/scenes/figure7.hpp"
 #include "bench/scenes/memory.hpp"
 #include "bench/scenes/noise_truth.hpp"
 #include "bench/scenes/run.hpp"
+#include "bench/scenes/search.hpp"
 #include "bench/scenes/table.hpp"
 
 namespace {
@@ -100,6 +102,20 @@ int main(int argc, char** argv) {
   alarms_command->add_option("--split", selection.split, "tune or report");
   add_shard(*alarms_command, selection);
 
+  std::size_t scenes = 20;
+  const auto comparing = [&](const char* name, const char* what) {
+    CLI::App* command = app.add_subcommand(name, what);
+    add_run_options(*command, options);
+    add_classes(*command, selection);
+    add_parts(*command, selection);
+    command->add_option("--split", selection.split, "tune or report");
+    command->add_option("--scenes", scenes, "of each part");
+    add_shard(*command, selection);
+    return command;
+  };
+  CLI::App* search_command = comparing("search", "votes beside the exhaustive search");
+  CLI::App* ablation_command = comparing("ablation", "what each addition to the method brings");
+
   CLI::App* table_command = app.add_subcommand("table", "print the figures of a run");
   table_command->add_option("folder", folder, "of the run")->required();
   CLI::App* noise_command = app.add_subcommand("noise", "the emulated LMS 400 looking at a table, beside a real one");
@@ -111,6 +127,8 @@ int main(int argc, char** argv) {
     if (*run_command) run(options, selection);
     if (*figure7_command) figure7(options, count, selection.shard, selection.shards);
     if (*alarms_command) alarms(options, selection, alarm_count);
+    if (*search_command) search(options, selection, scenes);
+    if (*ablation_command) ablation(options, selection, scenes);
     if (*noise_command) print_noise_truth(cloud);
     if (*table_command) print_table(folder);
     if (*memory_command) measure_memory(folder);

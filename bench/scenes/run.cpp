@@ -205,6 +205,8 @@ void run(const RunOptions& options, const RunSelection& selection, const std::ve
           if (number < contender.scenes && !file.has(line)) missing.emplace_back(std::move(line), &contender);
         }
         if (missing.empty()) continue;
+        // Who comes first finds cold caches: each has its turn.
+        std::ranges::rotate(missing, missing.begin() + static_cast<std::ptrdiff_t>(number % missing.size()));
         if (!part) part.emplace(options, setting, name);
         part->scene(*split, number, missing, [&](const SceneLine& line) { file.write(line); });
       }
