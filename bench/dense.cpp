@@ -77,6 +77,17 @@ void dense(benchmark::State& state, const kernels::Table& loops) {
 BENCHMARK_CAPTURE(dense, portable, kernels::portable())->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(dense, chosen, kernels::table())->Unit(benchmark::kMicrosecond);
 
+void look(benchmark::State& state) {
+  const Setting& s = setting();
+  Template drawn;
+  std::size_t k = 0;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(glance(s.scene, s.part, s.poses[k], drawn, 4));
+    k = (k + 1) % s.poses.size();
+  }
+}
+BENCHMARK(look)->Unit(benchmark::kMicrosecond);
+
 void draw(benchmark::State& state) {
   const Setting& s = setting();
   Template drawn;

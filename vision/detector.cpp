@@ -277,15 +277,15 @@ class Detecting {
     return kept;
   }
 
-  /// Rendered and compared as it is: cheaper than refinement by far, and tells which hypotheses of a place are worth
-  /// it.
+  /// Rendered coarsely and compared as it is: cheaper than refinement by far, and tells which hypotheses of a place are
+  /// worth it.
   void first_look(std::vector<Hypothesis>& hypotheses) const {
+    const int every = glance_every(scene_, part_.diameter_mm);
     std::vector<Template> drawn(static_cast<std::size_t>(std::clamp(options_.threads, 1, 64)));
     share(options_.threads, hypotheses.size(), deadline_, [&](std::size_t i, int thread) {
       Hypothesis& h = hypotheses[i];
       Template& t = drawn[static_cast<std::size_t>(thread)];
-      rasteriser_.draw(h.pose.R, h.pose.t, scene_.pixel_mm, scene_.origin_mm, t, false);
-      h.evidence = std::max(dense_test(scene_, rasteriser_, h.pose, t).evidence, 0.001F);
+      h.evidence = std::max(glance(scene_, rasteriser_, h.pose, t, every), 0.001F);
     });
   }
 

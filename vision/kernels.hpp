@@ -119,6 +119,9 @@ struct Table {
                      float* faces);
   /// Compares a template with the picture.
   void (*dense)(const Picture& picture, const Drawn& drawn, const DenseLimits& limits, DenseSum& sum);
+  /// The same for a template that was drawn with a pixel `every` times as wide, and lies on every so many of the
+  /// picture's. Its own neighbours are a jump apart from `model_jump_mm` on. Nothing about normals and curvature.
+  void (*glance)(const Picture& picture, const Drawn& drawn, int every, float model_jump_mm, DenseSum& sum);
   /// PixelState (verification.hpp) of the template's pixels, in its layout; writes nothing about eights of a row that
   /// are empty.
   void (*states)(const Picture& picture, const Drawn& drawn, std::uint8_t* states);

@@ -9,5 +9,5 @@ namespace {
 }  // namespace
 extern const Table kAvx2;
 const Table kAvx2{"avx2",       &coarse, &sparse,     &edges, &match_surface, &match_edges,
-                  &move_points, &draw,   &turn_faces, &dense, &states};
+                  &move_points, &draw,   &turn_faces, &dense, &glance,        &states};
 }  // namespace binpick::vision::kernels

@@ -8,5 +8,5 @@ namespace {
 }  // namespace
 extern const Table kPortable;
 const Table kPortable{"portable",   &coarse, &sparse,     &edges, &match_surface, &match_edges,
-                      &move_points, &draw,   &turn_faces, &dense, &states};
+                      &move_points, &draw,   &turn_faces, &dense, &glance,        &states};
 }  // namespace binpick::vision::kernels

@@ -120,6 +120,27 @@ float DenseTest::edge_ratio() const {
   return static_cast<float>(edges_found + 1) / static_cast<float>(edges_found + edges_missing + 1);
 }
 
+int glance_every(const Scene& scene, double diameter_mm) {
+  constexpr double kAcross = 40;
+  return std::max(1, static_cast<int>(std::lround(diameter_mm / (kAcross * scene.pixel_mm))));
+}
+
+float glance(const Scene& scene, const Rasteriser& part, const Pose& pose, Template& drawn, int every,
+             const kernels::Table& loops) {
+  part.draw(pose.R, pose.t, every * scene.pixel_mm, scene.origin_mm, drawn, false);
+  if (every == 1) return dense_test(scene, part, pose, drawn, loops).evidence;
+  if (drawn.rows == 0) return 0;
+  kernels::DenseSum sum;
+  loops.glance(picture_of(scene, false), drawn_of(scene, part, pose, drawn, loops), every,
+               jump_of(scene.noise_mm, every * scene.pixel_mm), sum);
+  const auto length = static_cast<float>(every), area = length * length;
+  // Of a pixel beside an edge only this share is one beside an edge at full size.
+  const float border = static_cast<float>(sum.contradicted_border) * (1 - kBorderWeight) / length;
+  return area * (sum.weight - kContradictionWeight * (static_cast<float>(sum.contradicted) - border)) +
+         length * (kEdgeFoundWeight * static_cast<float>(sum.edges_found) -
+                   kEdgeMissingWeight * static_cast<float>(sum.edges_missing));
+}
+
 void compare(const Scene& scene, const Rasteriser& part, const Pose& pose, const Template& drawn,
              std::vector<PixelState>& states, const kernels::Table& loops) {
   static_assert(sizeof(PixelState) == 1 && PixelState::Missing == PixelState{4});

@@ -177,6 +177,49 @@ TEST(Dense, SaysWhatAPlainLoopSays) {
   EXPECT_GT(bent, 10);
 }
 
+/// Spearman's rank correlation.
+double rank_correlation(const std::vector<float>& a, const std::vector<float>& b) {
+  const auto ranks = [](const std::vector<float>& values) {
+    std::vector<double> rank;
+    for (const float v : values)
+      rank.push_back(static_cast<double>(std::count_if(values.begin(), values.end(), [&](float o) { return o < v; })));
+    return rank;
+  };
+  const std::vector<double> x = ranks(a), y = ranks(b);
+  double sum = 0;
+  for (std::size_t k = 0; k < x.size(); ++k) sum += (x[k] - y[k]) * (x[k] - y[k]);
+  const auto n = static_cast<double>(x.size());
+  return 1 - 6 * sum / (n * (n * n - 1));
+}
+
+TEST(Dense, AGlanceOrdersPosesAsTheWholeTestDoes) {
+  const Pile pile;
+  Template drawn;
+  const std::vector<Pose> poses = poses_about(pile, 25);
+  std::vector<float> whole;
+  for (const Pose& pose : poses) whole.push_back(glance(pile.scene, pile.part, pose, drawn, 1));
+  const float most = *std::max_element(whole.begin(), whole.end());
+  EXPECT_GT(most, 1000);
+  for (const int every : {2, 3}) {
+    std::vector<float> seen;
+    float apart = 0;
+    for (std::size_t k = 0; k < poses.size(); ++k) {
+      seen.push_back(glance(pile.scene, pile.part, poses[k], drawn, every));
+      EXPECT_NEAR(seen[k], glance(pile.scene, pile.part, poses[k], drawn, every, kernels::portable()), 1e-2F * most);
+      if (whole[k] > 0.2F * most) apart = std::max(apart, std::abs(seen[k] - whole[k]));
+    }
+    EXPECT_GT(rank_correlation(whole, seen), 0.95) << every;
+    EXPECT_LT(apart, 0.15F * most) << every;
+  }
+}
+
+TEST(Dense, AGlanceSeesSomeFortyPixels) {
+  Scene scene;
+  scene.pixel_mm = 0.2;
+  EXPECT_EQ(glance_every(scene, 24), 3);
+  EXPECT_EQ(glance_every(scene, 2), 1);
+}
+
 TEST(Dense, FarOutsideIsMissing) {
   const Pile pile;
   Pose pose;
