@@ -122,6 +122,9 @@ struct Table {
   /// The same for a template that was drawn with a pixel `every` times as wide, and lies on every so many of the
   /// picture's. Its own neighbours are a jump apart from `model_jump_mm` on. Nothing about normals and curvature.
   void (*glance)(const Picture& picture, const Drawn& drawn, int every, float model_jump_mm, DenseSum& sum);
+  /// Which pixels of a template lie at an edge of its own, beside what is a jump lower, and which within a surface: a
+  /// bit each, a byte for eight pixels of a row, row by row.
+  void (*outline)(const Drawn& drawn, float jump_mm, std::uint8_t* inner, std::uint8_t* edges);
   /// PixelState (verification.hpp) of the template's pixels, in its layout; writes nothing about eights of a row that
   /// are empty.
   void (*states)(const Picture& picture, const Drawn& drawn, std::uint8_t* states);

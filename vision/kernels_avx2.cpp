@@ -8,6 +8,6 @@ namespace {
 #include "vision/kernels_dense.inc"
 }  // namespace
 extern const Table kAvx2;
-const Table kAvx2{"avx2",       &coarse, &sparse,     &edges, &match_surface, &match_edges,
-                  &move_points, &draw,   &turn_faces, &dense, &glance,        &states};
+const Table kAvx2{"avx2", &coarse,     &sparse, &edges,  &match_surface, &match_edges, &move_points,
+                  &draw,  &turn_faces, &dense,  &glance, &outline,       &states};
 }  // namespace binpick::vision::kernels

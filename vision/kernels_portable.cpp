@@ -7,6 +7,6 @@ namespace {
 #include "vision/kernels_dense.inc"
 }  // namespace
 extern const Table kPortable;
-const Table kPortable{"portable",   &coarse, &sparse,     &edges, &match_surface, &match_edges,
-                      &move_points, &draw,   &turn_faces, &dense, &glance,        &states};
+const Table kPortable{"portable", &coarse,     &sparse, &edges,  &match_surface, &match_edges, &move_points,
+                      &draw,      &turn_faces, &dense,  &glance, &outline,       &states};
 }  // namespace binpick::vision::kernels

@@ -3,7 +3,10 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <functional>
+#include <numeric>
 
 namespace binpick::vision {
 namespace {
@@ -27,6 +30,25 @@ void append(std::vector<float>& groups, std::size_t index, const std::array<floa
 }
 
 std::size_t filled(std::size_t count) { return (count + kernels::kLanes - 1) / kernels::kLanes * kernels::kLanes; }
+
+/// Calls use(row, col) for every so-manieth of the set bits, so that about `most` are used; a byte for eight pixels.
+template <class Use>
+void thinned(const std::vector<std::uint8_t>& bits, std::size_t row_bytes, std::size_t most, const Use& use) {
+  const int count = std::transform_reduce(bits.begin(), bits.end(), 0, std::plus{},
+                                          [](std::uint8_t byte) { return std::popcount(byte); });
+  const int step = std::max(1, (count + static_cast<int>(most) - 1) / static_cast<int>(most));
+  int skip = 0;  // set bits until the next one that is used
+  for (std::size_t i = 0; i < bits.size(); ++i) {
+    const unsigned byte = bits[i];
+    const int here = std::popcount(byte);
+    for (; skip < here; skip += step) {
+      unsigned rest = byte;
+      for (int k = 0; k < skip; ++k) rest &= rest - 1;
+      use(static_cast<int>(i / row_bytes), static_cast<int>(i % row_bytes * kernels::kLanes) + std::countr_zero(rest));
+    }
+    skip -= here;
+  }
+}
 }  // namespace
 
 void ModelPoints::add_surfel(const Eigen::Vector3f& p, const Eigen::Vector3f& n) {
@@ -46,48 +68,36 @@ ModelPoints model_points(const View& view, const Pose& pose) {
 }
 
 ModelPoints model_points(const Scene& scene, const Rasteriser& part, const Pose& pose, const Template& drawn,
-                         std::size_t surface_max, std::size_t edges_max) {
-  const float jump_mm = scene.jump_mm;
-  constexpr std::array<std::array<int, 2>, 4> kCross{{{0, 1}, {1, 0}, {0, -1}, {-1, 0}}};
-  struct Found {
-    int row, col;
-    Eigen::Vector2f out;
-  };
-  std::vector<Found> inner, edges;
-  for (int r = 0; r < drawn.rows; ++r)
-    for (int c = 0; c < drawn.cols; ++c) {
-      const std::size_t i = drawn.at(r, c);
-      if (drawn.triangle[i] < 0) continue;
-      Eigen::Vector2f out = Eigen::Vector2f::Zero();
-      bool beside_higher = false;
-      for (const auto& [dr, dc] : kCross) {
-        const bool in = r + dr >= 0 && c + dc >= 0 && r + dr < drawn.rows && c + dc < drawn.cols;
-        const float beside = in ? drawn.top_mm[drawn.at(r + dr, c + dc)] : std::numeric_limits<float>::quiet_NaN();
-        if (!(drawn.top_mm[i] - beside <= jump_mm))
-          out += Eigen::Vector2f(static_cast<float>(dc), static_cast<float>(dr));
-        beside_higher |= beside - drawn.top_mm[i] > jump_mm;
-      }
-      if (out.squaredNorm() > 0.5F)
-        edges.push_back({r, c, out.normalized()});
-      else if (!beside_higher)
-        inner.push_back({r, c, out});
-    }
-  const auto place = [&](const Found& f) {
-    return Eigen::Vector3f(static_cast<float>(scene.origin_mm.x() + scene.pixel_mm * (f.col + drawn.col0)),
-                           static_cast<float>(scene.origin_mm.y() + scene.pixel_mm * (f.row + drawn.row0)),
-                           drawn.top_mm[drawn.at(f.row, f.col)]);
-  };
+                         std::size_t surface_max, std::size_t edges_max, const kernels::Table& loops) {
   ModelPoints model;
-  const auto thin = [](std::size_t count, std::size_t most) {
-    return std::max<std::size_t>(1, (count + most - 1) / most);
+  if (drawn.rows == 0) return model;
+  const std::size_t row_bytes = filled(static_cast<std::size_t>(drawn.cols)) / kernels::kLanes;
+  thread_local std::vector<std::uint8_t> inner, edges;
+  inner.resize(row_bytes * static_cast<std::size_t>(drawn.rows));
+  edges.resize(inner.size());
+  const std::size_t first = drawn.at(0, 0);
+  kernels::Drawn pixels;
+  pixels.top_mm = drawn.top_mm.data() + first;
+  pixels.triangle = drawn.triangle.data() + first;
+  pixels.rows = drawn.rows, pixels.cols = drawn.cols, pixels.stride = drawn.stride;
+  loops.outline(pixels, scene.jump_mm, inner.data(), edges.data());
+
+  const auto place = [&](int r, int c) {
+    return Eigen::Vector3f(static_cast<float>(scene.origin_mm.x() + scene.pixel_mm * (c + drawn.col0)),
+                           static_cast<float>(scene.origin_mm.y() + scene.pixel_mm * (r + drawn.row0)),
+                           drawn.top_mm[drawn.at(r, c)]);
   };
-  for (std::size_t k = 0, step = thin(inner.size(), surface_max); k < inner.size(); k += step) {
-    Eigen::Vector3f n = pose.R * part.normal(drawn.triangle[drawn.at(inner[k].row, inner[k].col)]);
-    if (n.z() < 0) n = -n;
-    model.add_surfel(place(inner[k]), n);
-  }
-  for (std::size_t k = 0, step = thin(edges.size(), edges_max); k < edges.size(); k += step)
-    model.add_edge(place(edges[k]), edges[k].out);
+  thinned(inner, row_bytes, surface_max, [&](int r, int c) {
+    const Eigen::Vector3f n = pose.R * part.normal(drawn.triangle[drawn.at(r, c)]);
+    model.add_surfel(place(r, c), n.z() < 0 ? Eigen::Vector3f(-n) : n);
+  });
+  thinned(edges, row_bytes, edges_max, [&](int r, int c) {
+    const float z = drawn.top_mm[drawn.at(r, c)];
+    const auto ends = [&](int dr, int dc) {
+      return !(z - drawn.top_mm[drawn.at(r + dr, c + dc)] <= scene.jump_mm) ? 1.0F : 0.0F;
+    };
+    model.add_edge(place(r, c), Eigen::Vector2f(ends(0, 1) - ends(0, -1), ends(1, 0) - ends(-1, 0)).normalized());
+  });
   return model;
 }
 

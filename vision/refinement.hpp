@@ -24,7 +24,8 @@ class ModelPoints {
 ModelPoints model_points(const View& view, const Pose& pose);
 /// Of a rendered template: up to about `surface_max` pixels and `edges_max` edge pixels, evenly thinned.
 ModelPoints model_points(const Scene& scene, const Rasteriser& part, const Pose& pose, const Template& drawn,
-                         std::size_t surface_max, std::size_t edges_max);
+                         std::size_t surface_max, std::size_t edges_max,
+                         const kernels::Table& loops = kernels::table());
 
 struct RefineOptions {
   int steps = 4;
