@@ -32,6 +32,13 @@ nlohmann::json rows_of(const Eigen::MatrixXd& matrix) {
   return rows;
 }
 
+nlohmann::json to_json(const vision::Evidence& evidence) {
+  nlohmann::json json;
+  for (std::size_t k = 0; k < vision::kClueNames.size(); ++k)
+    json[std::string{vision::kClueNames[k]}] = evidence.clues[k];
+  return json;
+}
+
 nlohmann::json to_json(const std::string& part, const vision::DetectionReport& report) {
   nlohmann::json json{{"part", part},
                       {"time_ms", report.time_ms},
@@ -44,10 +51,13 @@ nlohmann::json to_json(const std::string& part, const vision::DetectionReport& r
     json["detections"].push_back({{"score", d.score},
                                   {"T_supply_object", rows_of(d.T_supply_object.iso.matrix())},
                                   {"visible_fraction", d.visible_fraction},
-                                  {"covariance", rows_of(d.covariance)}});
+                                  {"covariance", rows_of(d.covariance)},
+                                  {"evidence", to_json(d.evidence)}});
   for (const vision::Rejection& r : report.rejected)
-    json["rejected"].push_back(
-        {{"score", r.score}, {"T_supply_object", rows_of(r.T_supply_object.iso.matrix())}, {"reason", r.reason}});
+    json["rejected"].push_back({{"score", r.score},
+                                {"T_supply_object", rows_of(r.T_supply_object.iso.matrix())},
+                                {"reason", r.reason},
+                                {"evidence", to_json(r.evidence)}});
   return json;
 }
 

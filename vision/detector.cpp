@@ -1,38 +1,29 @@
 #include "vision/detector.hpp"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <mutex>
-#include <numbers>
 
 #include "base/check.hpp"
+#include "vision/candidates.hpp"
 #include "vision/exhaustive.hpp"
 #include "vision/feature.hpp"
-#include "vision/knowledge_base_impl.hpp"
 #include "vision/maxima.hpp"
-#include "vision/prepared.hpp"
-#include "vision/selection.hpp"
-#include "vision/team.hpp"
 #include "vision/voting.hpp"
 
 namespace binpick::vision {
 namespace {
 using SteadyClock = std::chrono::steady_clock;
 
-/// How many hypotheses survive each stage. Thousands are cheap to test and dear to lose; only distinct survivors pay
-/// for a rendered test.
-constexpr std::size_t kSparseBest = 3000;
-constexpr std::size_t kDistinctBest = 500;
-constexpr std::size_t kRenderedBest = 120;
-constexpr std::size_t kRenderedCrowdMax = 3;
-constexpr std::size_t kTurnedBest = 16;
+/// How many hypotheses of a pass survive each stage. Thousands are cheap to test and dear to lose; only distinct
+/// survivors pay for a rendered test.
+constexpr double kSparseBest = 2000, kDistinctBest = 300, kRenderedBest = 100, kTurnedBest = 16;
+/// So many of each maximum stay, whatever those of others are worth.
+constexpr std::size_t kOfEachMaximum = 6;
 /// So many poses of one place are enough: a well-seen object must not crowd out the others.
-constexpr std::size_t kCrowdMax = 10;
-constexpr std::size_t kRejectionsMax = 20;
+constexpr std::size_t kCrowdMax = 10, kRenderedCrowdMax = 3;
 constexpr double kSparseToleranceDiameters = 0.035;
 /// A rotation of a grid of 10 000 is up to nine degrees off, which moves the lowest point against the highest by so
 /// much: a narrower gate silently loses what lies flat on the floor.
@@ -40,10 +31,16 @@ constexpr double kFloorGateDiameters = 0.12;
 constexpr double kUsualGapRad = 0.0988;  ///< Of a grid of 10 000, on average.
 constexpr double kWallGateDiameters = 0.04;
 constexpr double kSameDiameters = 0.12;
+/// The first pass tries maxima this far apart; most objects are found at one of them.
+constexpr double kFirstApartDiameters = 0.15;
 /// Below this a hypothesis is no detection.
 constexpr double kScoreMin = 0.1;
 /// From this on a pose is valid by itself.
 constexpr double kValidScore = 0.5;
+
+constexpr std::array<std::string_view, 10> kAdditions{"edges",        "first look",  "turned",      "rooms",
+                                                      "explain away", "second pass", "all anchors", "second refinement",
+                                                      "normals",      "curvature"};
 
 /// Supply's floor: known, or found as the level below which there is nothing and on which much lies, or unknown.
 float floor_of(const Scene& scene, const SupplyBox& supply) {
@@ -82,12 +79,9 @@ class Detecting {
         supply_{supply},
         part_{base.impl()},
         options_{options},
-        rasteriser_{prepared(part_).rasteriser()},
-        centroid_{part_.mesh.centroid_mm().cast<float>()} {
+        finish_{scene_, part_, deadline_, {options.threads, with("edges"), with("second refinement")}},
+        centroid_{finish_.centroid_mm()} {
     noise_mm_ = std::max(options.noise_mm.value_or(part_.noise_mm), 1e-3);
-    double sum = 0;
-    for (const Eigen::Vector3f& v : part_.mesh.vertices_mm) sum += (v - centroid_).squaredNorm();
-    radius_mm_ = std::sqrt(sum / std::max<double>(1, static_cast<double>(part_.mesh.vertices_mm.size())));
   }
 
   DetectionReport run() {
@@ -101,31 +95,21 @@ class Detecting {
     report_.maxima = maxima.size();
     ended("maxima");
     observed({"maxima", maxima, {}});
-    std::vector<Hypothesis> hypotheses;
-    if (options_.search == Search::Votes) {
-      const std::vector<Ballot> ballots = ballots_of(maxima);
-      ended("votes");
-      observed("votes", ballots,
-               [&](const Ballot& b) { return pose_at(maxima[b.maximum], part_.views[b.view]).iso(); });
-      hypotheses = tested(maxima, ballots);
+    std::vector<Candidate> candidates;
+    Grid<std::uint8_t> explained;
+    if (with("second pass")) {
+      pass(far_apart(maxima), candidates);
+      select(scene_, finish_.rasteriser(), part_.symmetry, candidates, select_options(), kValidScore, &explained);
+      ended("selection");
+      pass(unexplained(maxima, explained), candidates);
     } else {
-      hypotheses = tested_all(maxima);
+      pass(maxima, candidates);
     }
-    ended("sparse test");
-    observed("sparse test", hypotheses, [](const Hypothesis& h) { return h.pose.iso(); });
-    nudge(hypotheses);
-    hypotheses = distinct(std::move(hypotheses), kDistinctBest, kCrowdMax);
-    ended("first refinement");
-    observed("first refinement", hypotheses, [](const Hypothesis& h) { return h.pose.iso(); });
-    first_look(hypotheses);
-    hypotheses = distinct(std::move(hypotheses), kRenderedBest, kRenderedCrowdMax);
-    ended("first look");
-    observed("first look", hypotheses, [](const Hypothesis& h) { return h.pose.iso(); });
-    std::vector<Candidate> candidates = rendered(hypotheses);
-    add_turned(candidates);
+    for (const auto& [stage, poses] : alive_) observed({stage, {}, poses});
+    if (with("turned")) finish_.add_turned(candidates, most(kTurnedBest), kSameDiameters * part_.diameter_mm);
     ended("rendered test");
     observed("rendered test", candidates, [](const Candidate& c) { return c.pose.iso(); });
-    report(select(scene_, rasteriser_, part_.symmetry, std::move(candidates), select_options()));
+    report(select(scene_, finish_.rasteriser(), part_.symmetry, std::move(candidates), select_options()));
     ended("selection");
     observed("selection", report_.detections, [](const Detection& d) { return d.T_supply_object.iso; });
     report_.time_ms = milliseconds_since(start_);
@@ -133,11 +117,73 @@ class Detecting {
   }
 
  private:
+  bool with(std::string_view addition) const { return !options_.without.contains(addition); }
+  std::size_t most(double cap) const { return static_cast<std::size_t>(std::max(1.0, cap * options_.effort)); }
+
+  /// From maxima to candidates, which are added and sorted by evidence.
+  void pass(const std::vector<Eigen::Vector3f>& maxima, std::vector<Candidate>& candidates) {
+    std::vector<Hypothesis> hypotheses;
+    if (options_.search == Search::Votes) {
+      const std::vector<Ballot> ballots = ballots_of(maxima);
+      ended("votes");
+      remember("votes", ballots,
+               [&](const Ballot& b) { return pose_at(maxima[b.maximum], part_.views[b.view]).iso(); });
+      hypotheses = tested(maxima, ballots);
+    } else {
+      hypotheses = tested_all(maxima);
+    }
+    ended("sparse test");
+    remember("sparse test", hypotheses, [](const Hypothesis& h) { return h.pose.iso(); });
+    nudge(hypotheses);
+    hypotheses = distinct(std::move(hypotheses), most(kDistinctBest), kCrowdMax);
+    ended("first refinement");
+    remember("first refinement", hypotheses, [](const Hypothesis& h) { return h.pose.iso(); });
+    if (with("first look")) {
+      std::vector<Pose> poses;
+      for (const Hypothesis& h : hypotheses) poses.push_back(h.pose);
+      const std::vector<float> evidence = finish_.looked_at(poses);
+      for (std::size_t i = 0; i < hypotheses.size(); ++i) hypotheses[i].evidence = evidence[i];
+    }
+    hypotheses = distinct(std::move(hypotheses), most(kRenderedBest), kRenderedCrowdMax);
+    ended("first look");
+    remember("first look", hypotheses, [](const Hypothesis& h) { return h.pose.iso(); });
+    render(hypotheses, candidates);
+    ended("rendered test");
+  }
+
+  /// Maxima with some room between them.
+  std::vector<Eigen::Vector3f> far_apart(const std::vector<Eigen::Vector3f>& maxima) const {
+    const auto apart = static_cast<float>(kFirstApartDiameters * part_.diameter_mm);
+    std::vector<Eigen::Vector3f> kept;
+    for (const Eigen::Vector3f& m : maxima)
+      if (std::none_of(kept.begin(), kept.end(), [&](const Eigen::Vector3f& k) { return (k - m).norm() < apart; }))
+        kept.push_back(m);
+    return kept;
+  }
+
+  /// Those that do not lie on what is known by now.
+  std::vector<Eigen::Vector3f> unexplained(const std::vector<Eigen::Vector3f>& maxima,
+                                           const Grid<std::uint8_t>& explained) const {
+    std::vector<Eigen::Vector3f> kept;
+    for (const Eigen::Vector3f& m : maxima) {
+      const auto px = [&](float mm, double origin) {
+        return static_cast<int>(std::lround((static_cast<double>(mm) - origin) / scene_.pixel_mm));
+      };
+      const int col = px(m.x(), scene_.origin_mm.x()), row = px(m.y(), scene_.origin_mm.y());
+      int known = 0, seen = 0;
+      for (int r = row - 1; r <= row + 1; ++r)
+        for (int c = col - 1; c <= col + 1; ++c)
+          if (scene_.inside(r, c)) ++seen, known += explained(r, c);
+      if (2 * known <= seen) kept.push_back(m);
+    }
+    return kept;
+  }
+
   static double milliseconds_since(SteadyClock::time_point from) {
     return std::chrono::duration<double, std::milli>(SteadyClock::now() - from).count();
   }
   void ended(const char* stage) {
-    report_.stages_ms[stage] = milliseconds_since(stage_start_);
+    report_.stages_ms[stage] += milliseconds_since(stage_start_);
     stage_start_ = SteadyClock::now();
   }
 
@@ -156,6 +202,19 @@ class Detecting {
     std::vector<Transform<frame::Supply, frame::Object>> poses;
     for (const auto& item : items) poses.push_back({iso_of(item)});
     observed({stage, {}, poses});
+  }
+
+  /// For the observer, who is told of all passes at once.
+  template <class Items, class IsoOf>
+  void remember(std::string_view stage, const Items& items, const IsoOf& iso_of) {
+    if (!options_.observer) return;
+    const auto begin = SteadyClock::now();
+    auto it = std::find_if(alive_.begin(), alive_.end(), [&](const auto& known) { return known.first == stage; });
+    if (it == alive_.end()) it = alive_.insert(it, {stage, {}});
+    for (const auto& item : items) it->second.push_back({iso_of(item)});
+    const auto spent = SteadyClock::now() - begin;
+    start_ += spent;
+    stage_start_ += spent;
   }
 
   /// How far apart the training rotations are, against the usual grid.
@@ -196,10 +255,15 @@ class Detecting {
                                        static_cast<double>(tolerance_of(scene_))));
   }
 
-  static void keep_best(std::vector<Hypothesis>& hypotheses, std::size_t most) {
+  /// The best few of each maximum, then the best of all.
+  void keep_best(std::vector<Hypothesis>& hypotheses) const {
     std::stable_sort(hypotheses.begin(), hypotheses.end(), stronger);
-    if (hypotheses.size() > most)
-      hypotheses.erase(hypotheses.begin() + static_cast<std::ptrdiff_t>(most), hypotheses.end());
+    std::map<std::uint32_t, std::size_t> of_maximum;
+    std::stable_partition(hypotheses.begin(), hypotheses.end(),
+                          [&](const Hypothesis& h) { return of_maximum[h.maximum]++ < kOfEachMaximum; });
+    const std::size_t best = most(kSparseBest);
+    if (hypotheses.size() > best)
+      hypotheses.erase(hypotheses.begin() + static_cast<std::ptrdiff_t>(best), hypotheses.end());
   }
 
   std::vector<Hypothesis> tested_all(const std::vector<Eigen::Vector3f>& maxima) {
@@ -207,15 +271,19 @@ class Detecting {
     search.tolerance_mm = coarse_tolerance_mm();
     search.z_floor_mm = lowest_allowed_mm_;
     search.threads = options_.threads;
+    search.effort = options_.effort;
+    search.all_anchors = with("all anchors");
     std::vector<Hypothesis> hypotheses;
-    for (const Standing& s : search_all(scene_, part_, maxima, search, deadline_, report_.hypotheses))
+    std::size_t passed = 0;
+    for (const Standing& s : search_all(scene_, part_, maxima, search, deadline_, passed))
       hypotheses.push_back({s.maximum, s.view, pose_at(maxima[s.maximum], part_.views[s.view], s.anchor), s.evidence});
-    keep_best(hypotheses, kSparseBest);
+    report_.hypotheses += passed;
+    keep_best(hypotheses);
     return hypotheses;
   }
 
   std::vector<Hypothesis> tested(const std::vector<Eigen::Vector3f>& maxima, const std::vector<Ballot>& ballots) {
-    report_.hypotheses = ballots.size();
+    report_.hypotheses += ballots.size();
     const float tolerance = coarse_tolerance_mm();
     std::vector<float> evidence(ballots.size(), -1);
     constexpr std::size_t kBlock = 64;
@@ -228,7 +296,7 @@ class Detecting {
       if (evidence[i] > 0)
         hypotheses.push_back({ballots[i].maximum, ballots[i].view,
                               pose_at(maxima[ballots[i].maximum], part_.views[ballots[i].view]), evidence[i]});
-    keep_best(hypotheses, kSparseBest);
+    keep_best(hypotheses);
     return hypotheses;
   }
 
@@ -239,19 +307,14 @@ class Detecting {
     options.steps = 5;
     options.gate_from_mm = std::max(3 * tolerance, static_cast<float>(0.06 * part_.diameter_mm));
     options.gate_to_mm = std::max(2 * tolerance, static_cast<float>(0.03 * part_.diameter_mm));
-    options.edge_gate_from_px = edge_gate_px(6, 0.08);
-    options.edge_gate_to_px = edge_gate_px(3, 0.03);
+    options.edge_gate_from_px = finish_.edge_gate_px(6, 0.08);
+    options.edge_gate_to_px = finish_.edge_gate_px(3, 0.03);
     share(options_.threads, hypotheses.size(), deadline_, [&](std::size_t i, int) {
       Hypothesis& h = hypotheses[i];
       const View& view = part_.views[h.view];
       refine(scene_, model_points(view, h.pose), h.pose.R * centroid_ + h.pose.t, options, h.pose);
       h.evidence = sparse_evidence(scene_, part_, h.view, h.pose, 2 * tolerance);
     });
-  }
-
-  /// Edges pull from as far as the pose may be off: pixels, or a share of the part where pixels are small.
-  float edge_gate_px(float pixels, double diameters) const {
-    return std::max(pixels, static_cast<float>(diameters * part_.diameter_mm / scene_.pixel_mm));
   }
 
   std::vector<Hypothesis> distinct(std::vector<Hypothesis> hypotheses, std::size_t most, std::size_t crowd) const {
@@ -267,8 +330,8 @@ class Detecting {
       for (std::size_t k = 0; k < kept.size() && !again; ++k) {
         const float apart = (centres[k] - centre).norm();
         near += apart < crowd_mm;
-        again =
-            apart < same_mm && displacement_mm({kept[k].pose, {}}, {h.pose, {}}, part_.symmetry, radius_mm_) < same_mm;
+        again = apart < same_mm && displacement_mm({kept[k].pose, {}, {}, {}}, {h.pose, {}, {}, {}}, part_.symmetry,
+                                                   finish_.radius_mm()) < same_mm;
       }
       if (again || near >= crowd) continue;
       kept.push_back(h);
@@ -277,122 +340,33 @@ class Detecting {
     return kept;
   }
 
-  /// Rendered coarsely and compared as it is: cheaper than refinement by far, and tells which hypotheses of a place are
-  /// worth it.
-  void first_look(std::vector<Hypothesis>& hypotheses) const {
-    const int every = glance_every(scene_, part_.diameter_mm);
-    std::vector<Template> drawn(static_cast<std::size_t>(std::clamp(options_.threads, 1, 64)));
-    share(options_.threads, hypotheses.size(), deadline_, [&](std::size_t i, int thread) {
-      Hypothesis& h = hypotheses[i];
-      Template& t = drawn[static_cast<std::size_t>(thread)];
-      h.evidence = std::max(glance(scene_, rasteriser_, h.pose, t, every), 0.001F);
-    });
-  }
-
-  /// Refined against its own render, twice; then the rendered test.
-  Candidate render_and_refine(Pose pose, Template& drawn) const {
-    const float tolerance = tolerance_of(scene_);
-    Candidate candidate;
-    RefineOptions options;
-    options.steps = 5;
-    options.gate_from_mm = std::max(2 * tolerance, static_cast<float>(0.03 * part_.diameter_mm));
-    options.gate_to_mm = 2 * tolerance;
-    options.edge_gate_from_px = edge_gate_px(4, 0.04);
-    for (int round = 0; round < 2; ++round) {
-      rasteriser_.draw(pose.R, pose.t, scene_.pixel_mm, scene_.origin_mm, drawn, false);
-      const ModelPoints points = model_points(scene_, rasteriser_, pose, drawn, 400, 160);
-      candidate.information = refine(scene_, points, pose.R * centroid_ + pose.t, options, pose);
-      options.gate_from_mm = options.gate_to_mm = std::max(3.5F * static_cast<float>(noise_mm_), tolerance);
-      options.edge_gate_from_px = 2;
-      options.single_heights = true;
-    }
-    rasteriser_.draw(pose.R, pose.t, scene_.pixel_mm, scene_.origin_mm, drawn, false);
-    candidate.pose = pose;
-    candidate.test = dense_test(scene_, rasteriser_, pose, drawn);
-    return candidate;
-  }
-
-  std::vector<Candidate> rendered(const std::vector<Hypothesis>& hypotheses) {
-    std::vector<Candidate> candidates(hypotheses.size());
+  void render(const std::vector<Hypothesis>& hypotheses, std::vector<Candidate>& candidates) {
+    std::vector<Candidate> made(hypotheses.size());
     std::vector<Template> drawn(static_cast<std::size_t>(std::clamp(options_.threads, 1, 64)));
     std::mutex first_valid;
+    const std::size_t before = rendered_;
+    rendered_ += hypotheses.size();
     share(options_.threads, hypotheses.size(), deadline_, [&](std::size_t i, int thread) {
-      candidates[i] = render_and_refine(hypotheses[i].pose, drawn[static_cast<std::size_t>(thread)]);
-      if (score_of(candidates[i]) < kValidScore || !outside(candidates[i].pose).empty()) return;
+      made[i] = finish_.finished(hypotheses[i].pose, drawn[static_cast<std::size_t>(thread)]);
+      if (score_of(made[i].evidence) < kValidScore || !outside(made[i].pose).empty()) return;
       const std::scoped_lock lock{first_valid};
-      if (!report_.first) report_.first = FirstValid{{candidates[i].pose.iso()}, milliseconds_since(start_), i + 1};
+      if (!report_.first) report_.first = FirstValid{{made[i].pose.iso()}, milliseconds_since(start_), before + i + 1};
     });
-    std::erase_if(candidates, [](const Candidate& c) { return c.test.evidence <= 0; });
+    for (Candidate& c : made)
+      if (c.test.evidence > 0) candidates.push_back(std::move(c));
     std::stable_sort(candidates.begin(), candidates.end(),
                      [](const Candidate& a, const Candidate& b) { return a.test.evidence > b.test.evidence; });
-    return candidates;
-  }
-
-  /// Parts look much alike from both sides, or end for end. The strongest candidates are tried in the turns about
-  /// the part's principal axes that are no symmetry: either the turned one is better, or how much worse it
-  /// is tells how sure the first one is.
-  void add_turned(std::vector<Candidate>& candidates) const {
-    std::vector<Candidate> strongest;
-    for (const Candidate& c : candidates) {
-      if (strongest.size() >= kTurnedBest) break;
-      const bool again = std::any_of(strongest.begin(), strongest.end(), [&](const Candidate& other) {
-        return displacement_mm(other, c, part_.symmetry, radius_mm_) < kSameDiameters * part_.diameter_mm;
-      });
-      if (!again) strongest.push_back(c);
-    }
-    const std::vector<Eigen::Matrix3f> turns = principal_turns();
-    std::vector<Candidate> turned(strongest.size() * turns.size());
-    std::vector<Template> drawn(static_cast<std::size_t>(std::clamp(options_.threads, 1, 64)));
-    share(options_.threads, turned.size(), deadline_, [&](std::size_t i, int thread) {
-      Pose pose = strongest[i / turns.size()].pose;
-      const Eigen::Vector3f centre = pose.R * centroid_ + pose.t;
-      pose.R = pose.R * turns[i % turns.size()];
-      pose.t = centre - pose.R * centroid_;
-      turned[i] = render_and_refine(pose, drawn[static_cast<std::size_t>(thread)]);
-    });
-    for (const Candidate& c : turned)
-      if (c.test.evidence > 0) candidates.push_back(c);
-  }
-
-  /// Quarter turns about the principal axes; steps of 15 degrees about an axis that the part is nearly round about (a
-  /// wheel's spokes are found by the next edge only). None that the symmetry makes another's equal.
-  std::vector<Eigen::Matrix3f> principal_turns() const {
-    constexpr double kNearlyRound = 0.8;
-    constexpr double kStepRad = std::numbers::pi / 12;
-    Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-    for (const Eigen::Vector3f& v : part_.mesh.vertices_mm) {
-      const Eigen::Vector3d d = (v - centroid_).cast<double>();
-      spread += d * d.transpose();
-    }
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> principal(spread);
-    const Eigen::Vector3d centroid = centroid_.cast<double>();
-    std::vector<Eigen::Isometry3d> distinct{Eigen::Isometry3d::Identity()};
-    for (int axis = 0; axis < 3; ++axis) {
-      const double a = principal.eigenvalues()[(axis + 1) % 3], b = principal.eigenvalues()[(axis + 2) % 3];
-      const int steps = std::min(a, b) > kNearlyRound * std::max(a, b) ? 1 : 6;
-      for (int k = steps; k < 24; k += steps) {
-        Eigen::Isometry3d moved = Eigen::Isometry3d::Identity();
-        moved.linear() =
-            Eigen::AngleAxisd(kStepRad * k, principal.eigenvectors().col(axis).normalized()).toRotationMatrix();
-        moved.translation() = centroid - moved.linear() * centroid;
-        const bool again = std::any_of(distinct.begin(), distinct.end(), [&](const Eigen::Isometry3d& other) {
-          const PoseDistance d = pose_distance(other, moved, part_.symmetry, radius_mm_);
-          return d.angle_rad < 0.1 && d.centroid_mm < 0.05 * part_.diameter_mm;
-        });
-        if (!again) distinct.push_back(moved);
-      }
-    }
-    std::vector<Eigen::Matrix3f> turns;
-    for (std::size_t k = 1; k < distinct.size(); ++k) turns.push_back(distinct[k].linear().cast<float>());
-    return turns;
   }
 
   SelectOptions select_options() const {
     SelectOptions options;
     options.same_mm = kSameDiameters * part_.diameter_mm;
     options.diameter_mm = part_.diameter_mm;
-    options.radius_mm = radius_mm_;
-    options.centroid_mm = centroid_.cast<double>();
+    options.radius_mm = finish_.radius_mm();
+    options.score_min = kScoreMin;
+    options.outside = [this](const Pose& pose) { return outside(pose); };
+    options.rooms = with("rooms");
+    options.explain_away = with("explain away");
     return options;
   }
 
@@ -414,39 +388,27 @@ class Detecting {
     return {};
   }
 
-  Matrix6 covariance_of(const Matrix6& information) const {
-    // Single points are fewer than pixels where holes were filled; the scanner's own error is common to all of them.
-    constexpr double kCorrelation = 2.0;
-    constexpr double kCommonShare = 0.1;
-    Matrix6 prior = Matrix6::Zero();
-    prior.diagonal().head<3>().setConstant(1 / std::pow(0.1 * part_.diameter_mm, 2));
-    prior.diagonal().tail<3>().setConstant(1 / std::pow(0.3, 2));
-    Matrix6 covariance = (information / kCorrelation + prior).inverse();
-    covariance.diagonal().head<3>().array() += std::pow(kCommonShare * noise_mm_, 2);
-    return 0.5 * (covariance + covariance.transpose());
-  }
-
   void report(const std::vector<Selected>& selected) {
+    const auto rejections = static_cast<std::size_t>(std::max(0, options_.rejections_max));
     for (const Selected& entry : selected) {
       const Transform<frame::Supply, frame::Object> T{entry.candidate.pose.iso()};
-      std::string reason = entry.reason;
-      if (reason.empty()) reason = outside(entry.candidate.pose);
-      if (reason.empty() && entry.score < kScoreMin) reason = "too little evidence";
+      const std::string reason = entry.reason.empty() && entry.score < kScoreMin ? "too little evidence" : entry.reason;
       if (reason.empty()) {
         Detection detection;
         detection.T_supply_object = T;
         detection.score = entry.score;
+        detection.evidence = entry.candidate.evidence;
         detection.visible_fraction = entry.candidate.test.visible_fraction();
-        detection.covariance = covariance_of(entry.candidate.information);
+        detection.covariance = finish_.covariance_of(entry.candidate.information);
         report_.detections.push_back(detection);
-      } else if (report_.rejected.size() < kRejectionsMax && (reason != entry.reason || !entry.overshadowed)) {
-        report_.rejected.push_back({T, entry.score, reason});
+      } else if (report_.rejected.size() < rejections && (reason != entry.reason || !entry.overshadowed)) {
+        report_.rejected.push_back({T, entry.score, entry.candidate.evidence, reason});
       }
     }
     // Then what lost to a better pose of the same place: many, and they tell little.
     for (const Selected& entry : selected)
-      if (entry.overshadowed && report_.rejected.size() < kRejectionsMax)
-        report_.rejected.push_back({{entry.candidate.pose.iso()}, entry.score, entry.reason});
+      if (entry.overshadowed && report_.rejected.size() < rejections)
+        report_.rejected.push_back({{entry.candidate.pose.iso()}, entry.score, entry.candidate.evidence, entry.reason});
     if (options_.detections_max > 0 && report_.detections.size() > static_cast<std::size_t>(options_.detections_max))
       report_.detections.resize(static_cast<std::size_t>(options_.detections_max));
   }
@@ -457,29 +419,18 @@ class Detecting {
   const SupplyBox& supply_;
   const KnowledgeBase::Impl& part_;
   const DetectorOptions& options_;
-  const Rasteriser& rasteriser_;
+  Scene scene_;  // before what refers to it
+  Finisher finish_;
   Eigen::Vector3f centroid_;
-  double noise_mm_ = 1, radius_mm_ = 1;
+  double noise_mm_ = 1;
   float floor_mm_ = 0, lowest_allowed_mm_ = 0;
-  Scene scene_;
+  std::size_t rendered_ = 0;
+  std::vector<std::pair<std::string_view, std::vector<Transform<frame::Supply, frame::Object>>>> alive_;
   DetectionReport report_;
 };
 }  // namespace
 
-std::span<const std::string_view> detector_additions() {
-  static constexpr std::array<std::string_view, 11> kAdditions{"edges",
-                                                               "first look",
-                                                               "turned",
-                                                               "rooms",
-                                                               "explain away",
-                                                               "second pass",
-                                                               "all anchors",
-                                                               "normals",
-                                                               "calibrated score",
-                                                               "second refinement",
-                                                               "curvature"};
-  return kAdditions;
-}
+std::span<const std::string_view> detector_additions() { return kAdditions; }
 
 DetectionReport detect(const DepthImage& image, const SupplyBox& supply, const KnowledgeBase& part,
                        const DetectorOptions& options) {

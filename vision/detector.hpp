@@ -13,6 +13,7 @@
 
 #include "base/frames.hpp"
 #include "vision/depth_image.hpp"
+#include "vision/evidence.hpp"
 #include "vision/knowledge_base.hpp"
 
 namespace binpick::vision {
@@ -37,6 +38,7 @@ struct DetectorOptions {
   std::optional<std::chrono::milliseconds> deadline;  ///< Return the best so far.
   int threads = 2;                                    ///< The result does not depend on it.
   int detections_max = 0;                             ///< 0: unlimited.
+  int rejections_max = 20;                            ///< How many of those not believed are told.
   StageObserver observer;                             ///< Called after each stage; empty: nothing is done for it.
   std::set<std::string, std::less<>> without;         ///< Of detector_additions(): to see what each brings.
 };
@@ -47,6 +49,7 @@ std::span<const std::string_view> detector_additions();
 struct Detection {
   Transform<frame::Supply, frame::Object> T_supply_object;
   double score = 0.0;             ///< Probability that this detection is right, 0 … 1.
+  Evidence evidence;              ///< What the score is made of.
   double visible_fraction = 0.0;  ///< Share of the silhouette that is the top surface, 0 … 1.
   Matrix6 covariance =
       Matrix6::Zero();  ///< Of (translation mm, rotation rad), supply axes, at the part's surface centroid.
@@ -55,6 +58,7 @@ struct Detection {
 struct Rejection {
   Transform<frame::Supply, frame::Object> T_supply_object;
   double score = 0.0;
+  Evidence evidence;
   std::string reason;  ///< "free space seen through it", "edges missing", "explained by a better one" …
 };
 

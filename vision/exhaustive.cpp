@@ -15,8 +15,7 @@ constexpr std::size_t kMoreSamples = 64;
 constexpr int kExplainedMin = 4;
 constexpr int kContradictedMax = 8;
 /// So many pass the first test in all; shared evenly, lest a wide plateau takes the time of all others.
-constexpr std::size_t kPassedMax = 200'000;
-constexpr std::size_t kPassedMin = 400;
+constexpr double kPassedMax = 100'000, kPassedMin = 400;
 constexpr std::size_t kBlockRows = 2048;
 
 /// The picture with a frame as wide as the part, so that no sample needs to be asked whether it is inside.
@@ -83,7 +82,8 @@ std::vector<Standing> search_all(const Scene& scene, const KnowledgeBase::Impl& 
   const std::vector<Prepared::Row>& rows = ready.rows();
   const std::vector<std::int32_t> offsets = offsets_in(padded, ready, scene.pixel_mm);
   const kernels::Picture picture = picture_of(scene, false);
-  const std::size_t budget = std::max(kPassedMin, kPassedMax / maxima.size());
+  const double share_of_one = std::max(kPassedMin, kPassedMax / static_cast<double>(maxima.size()));
+  const auto budget = static_cast<std::size_t>(options.effort * share_of_one);
   struct Place {
     const float* at = nullptr;  ///< In the padded picture; nothing: outside.
     std::size_t rows = 0;       ///< Those that do not reach through the floor.
@@ -128,6 +128,7 @@ std::vector<Standing> search_all(const Scene& scene, const KnowledgeBase::Impl& 
     std::vector<Standing>& found = all[m];
     for (const std::uint32_t rank : best) {
       const std::uint32_t i = kernels::view_of(rank);
+      if (rows[i].anchor > 0 && !options.all_anchors) continue;
       const std::span<const float> points = ready.surface(rows[i].view);
       const std::size_t n = std::min(kMoreSamples, points.size() / 3);
       kernels::SparseSum sum;

@@ -60,8 +60,13 @@ void add_anchors(const Scene& scene, const std::vector<Peak>& plateau, double ce
     anchors.push_back(supply(centroid));
     return;
   }
+  std::vector<Eigen::Vector3d> means;
   for (const auto& [cell, mean] : cells)
-    if (mean.n >= few) anchors.push_back(supply(mean.value()));
+    if (mean.n >= few) means.push_back(mean.value());
+  std::stable_sort(means.begin(), means.end(), [&](const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+    return (a - centroid).head<2>().squaredNorm() < (b - centroid).head<2>().squaredNorm();
+  });
+  for (const Eigen::Vector3d& mean : means) anchors.push_back(supply(mean));
 }
 }  // namespace
 
@@ -96,8 +101,6 @@ std::vector<Eigen::Vector3f> find_maxima(const Scene& scene, const MaximaOptions
     }
     if (plateau.size() >= 3) add_anchors(scene, plateau, kGridDiameters * options.diameter_mm, anchors);
   }
-  std::stable_sort(anchors.begin(), anchors.end(),
-                   [](const Eigen::Vector3f& a, const Eigen::Vector3f& b) { return a.z() > b.z(); });
   return anchors;
 }
 }  // namespace binpick::vision

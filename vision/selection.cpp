@@ -7,17 +7,10 @@
 
 namespace binpick::vision {
 namespace {
-constexpr float kVisibleMin = 0.15F;
-constexpr float kContradictedMax = 0.25F;
-constexpr float kEdgeRatioMin = 0.35F;
-constexpr float kNormalAgreementMin = 0.5F;
-constexpr float kBendAgreementMin = 0.0F;
 constexpr double kClaimedMax = 0.5;
 constexpr double kInsideMax = 0.12;
 /// A rival has to speak of mostly the same pixels.
 constexpr double kRivalShare = 0.6;
-/// Share of the evidence that noise makes differ.
-constexpr double kRivalScale = 0.012;
 
 std::string percent(const char* text, double share) {
   std::array<char, 100> line{};
@@ -25,8 +18,10 @@ std::string percent(const char* text, double share) {
   return line.data();
 }
 
-/// What the candidate's own figures say against it.
-std::string own_reason(const DenseTest& test) {
+/// What speaks most against a pose that is not believed.
+std::string what_speaks_against(const DenseTest& test) {
+  constexpr float kVisibleMin = 0.2F, kContradictedMax = 0.15F, kEdgeRatioMin = 0.5F, kNormalAgreementMin = 0.6F,
+                  kBendAgreementMin = 0.1F;
   if (test.explained == 0 || test.evidence <= 0) return "more contradicted than explained";
   if (test.visible_fraction() < kVisibleMin) return percent("mostly hidden (%.0f %% seen)", test.visible_fraction());
   if (test.contradicted_ratio() > kContradictedMax)
@@ -35,7 +30,7 @@ std::string own_reason(const DenseTest& test) {
   if (test.normal_agreement < kNormalAgreementMin)
     return percent("normals disagree (%.0f %%)", 1 - test.normal_agreement);
   if (test.bend_agreement < kBendAgreementMin) return "curvature disagrees";
-  return {};
+  return "too little evidence";
 }
 
 /// Columns in which both bodies claim the same room, over the columns of the smaller.
@@ -64,17 +59,9 @@ double displacement_mm(const Candidate& a, const Candidate& b, const Symmetry& s
   return std::hypot(distance.centroid_mm, std::sqrt(2.0 / 3.0) * turn);
 }
 
-double score_of(const Candidate& candidate) {
-  const DenseTest& t = candidate.test;
-  const double logit = -4.0 + 4.0 * std::min(1.0F, t.visible_fraction() / 0.6F) - 22.0 * t.contradicted_ratio() +
-                       3.0 * t.edge_ratio() + 3.0 * (t.normal_agreement - 0.5) + 2.0 * t.bend_agreement;
-  // A rival that explains as much is as likely; evidence that differs by a few per cent decides.
-  const double against_rival = 1 / (1 + std::exp((candidate.rival - 1) / kRivalScale));
-  return against_rival / (1 + std::exp(-logit));
-}
-
 std::vector<Selected> select(const Scene& scene, const Rasteriser& part, const Symmetry& symmetry,
-                             std::vector<Candidate> candidates, const SelectOptions& options) {
+                             std::vector<Candidate> candidates, const SelectOptions& options, double sure,
+                             Grid<std::uint8_t>* explained_by_sure) {
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const Candidate& a, const Candidate& b) { return a.test.evidence > b.test.evidence; });
   struct Standing {
@@ -92,32 +79,43 @@ std::vector<Selected> select(const Scene& scene, const Rasteriser& part, const S
       return displacement_mm(all[s.selected].candidate, candidate, symmetry, options.radius_mm) < options.same_mm;
     });
     if (again) continue;
-    Selected entry{candidate, 0, own_reason(candidate.test)};
+    Selected entry{candidate, 0, options.outside ? options.outside(candidate.pose) : "", false};
+    if (entry.reason.empty() && score_of(candidate.evidence) < options.score_min)
+      entry.reason = what_speaks_against(candidate.test);
+    if (!entry.reason.empty()) {
+      all.push_back(std::move(entry));
+      continue;
+    }
     Template drawn;
     part.draw(candidate.pose.R, candidate.pose.t, scene.pixel_mm, scene.origin_mm, drawn);
     compare(scene, part, candidate.pose, drawn, states);
-    if (entry.reason.empty()) {
-      std::vector<int> claims(standing.size(), 0);
-      int explained = 0, claimed = 0;
-      for (int r = 0; r < drawn.rows; ++r)
-        for (int c = 0; c < drawn.cols; ++c) {
-          if (states[drawn.at(r, c)] != PixelState::Explained) continue;
-          ++explained;
-          const std::int32_t other = owner(r + drawn.row0, c + drawn.col0);
-          if (other < 0) continue;
-          ++claimed;
-          ++claims[static_cast<std::size_t>(other)];
-        }
-      for (std::size_t s = 0; s < standing.size(); ++s) {
-        const double share = static_cast<double>(claims[s]) / std::max(1, explained);
-        Candidate& better = all[standing[s].selected].candidate;
-        if (share > kRivalShare) better.rival = std::max(better.rival, candidate.test.evidence / better.test.evidence);
-        if (entry.reason.empty() && share <= kClaimedMax && shared_room(standing[s].drawn, drawn, room_mm) > kInsideMax)
-          entry.reason = "stands inside a better one";
+    std::vector<int> claims(standing.size(), 0);
+    int explained = 0, claimed = 0;
+    for (int r = 0; r < drawn.rows; ++r)
+      for (int c = 0; c < drawn.cols; ++c) {
+        if (states[drawn.at(r, c)] != PixelState::Explained) continue;
+        ++explained;
+        const std::int32_t other = owner(r + drawn.row0, c + drawn.col0);
+        if (other < 0) continue;
+        ++claimed;
+        ++claims[static_cast<std::size_t>(other)];
       }
-      if (claimed > kClaimedMax * explained) entry.reason = "explained by a better one";
-      entry.overshadowed = !entry.reason.empty();
+    for (std::size_t s = 0; s < standing.size(); ++s) {
+      const float share = static_cast<float>(claims[s]) / static_cast<float>(std::max(1, explained));
+      Candidate& better = all[standing[s].selected].candidate;
+      if (share > kRivalShare)
+        better.evidence[Clue::Rival] =
+            std::max(better.evidence[Clue::Rival], candidate.test.evidence / better.test.evidence);
+      if (options.rooms && entry.reason.empty() && share <= kClaimedMax &&
+          shared_room(standing[s].drawn, drawn, room_mm) > kInsideMax)
+        entry.reason = "stands inside a better one";
     }
+    Evidence& evidence = entry.candidate.evidence;
+    evidence[Clue::Claimed] = static_cast<float>(claimed) / static_cast<float>(std::max(1, explained));
+    if (options.explain_away && evidence[Clue::Claimed] > kClaimedMax) entry.reason = "explained by a better one";
+    entry.overshadowed = !entry.reason.empty();
+    if (entry.reason.empty() && score_of(evidence) < options.score_min)
+      entry.reason = what_speaks_against(entry.candidate.test);
     if (entry.reason.empty()) {
       for (int r = 0; r < drawn.rows; ++r)
         for (int c = 0; c < drawn.cols; ++c)
@@ -129,7 +127,11 @@ std::vector<Selected> select(const Scene& scene, const Rasteriser& part, const S
     }
     all.push_back(std::move(entry));
   }
-  for (Selected& entry : all) entry.score = score_of(entry.candidate);
+  for (Selected& entry : all) entry.score = score_of(entry.candidate.evidence);
+  if (explained_by_sure != nullptr)
+    *explained_by_sure = owner.unaryExpr([&](std::int32_t s) {
+      return static_cast<std::uint8_t>(s >= 0 && all[standing[static_cast<std::size_t>(s)].selected].score >= sure);
+    });
   std::stable_sort(all.begin(), all.end(), [](const Selected& a, const Selected& b) { return a.score > b.score; });
   return all;
 }

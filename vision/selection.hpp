@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "vision/refinement.hpp"
+#include "vision/score.hpp"
 #include "vision/symmetry.hpp"
 
 namespace binpick::vision {
@@ -13,14 +14,17 @@ struct Candidate {
   Pose pose;
   DenseTest test;
   Matrix6 information = Matrix6::Zero();
-  float rival = 0;  ///< Evidence of the best distinct pose at the same place, relative to its own, 0 … 1.
+  Evidence evidence;  ///< Without Clue::Claimed and Clue::Rival before select().
 };
 
 struct SelectOptions {
   double same_mm = 10;  ///< Poses nearer (surface displacement) are one object.
   double diameter_mm = 100;
-  double radius_mm = 40;                                  ///< Rms distance of the surface from its centroid.
-  Eigen::Vector3d centroid_mm = Eigen::Vector3d::Zero();  ///< Object frame.
+  double radius_mm = 40;  ///< Rms distance of the surface from its centroid.
+  double score_min = 0.1;
+  std::function<std::string(const Pose&)> outside;  ///< Why the part cannot be there at all; empty: it can.
+  bool rooms = true;                                ///< Two bodies do not share room.
+  bool explain_away = true;                         ///< A pixel is explained once.
 };
 
 struct Selected {
@@ -32,12 +36,12 @@ struct Selected {
 
 /// Goes through the candidates by evidence: the first stands; what shows the same object again is dropped, what lives
 /// on pixels that a better one explains already, or stands inside of it, is rejected with that reason, and so is what
-/// contradicts the picture by itself. Best first.
+/// is not believed by itself. Best first. `explained` becomes 1 where a detection of at least `sure` explains the
+/// picture, else 0.
 std::vector<Selected> select(const Scene& scene, const Rasteriser& part, const Symmetry& symmetry,
-                             std::vector<Candidate> candidates, const SelectOptions& options);
+                             std::vector<Candidate> candidates, const SelectOptions& options, double sure = 1,
+                             Grid<std::uint8_t>* explained = nullptr);
 
-/// Calibrated probability that a candidate is right, from its own figures.
-double score_of(const Candidate& candidate);
 /// Surface displacement (rms, mm) that the distance of two poses stands for.
 double displacement_mm(const Candidate& a, const Candidate& b, const Symmetry& symmetry, double radius_mm);
 }  // namespace binpick::vision

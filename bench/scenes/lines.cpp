@@ -42,6 +42,17 @@ vision::Matrix6 to_covariance(const Json& json) {
   return covariance;
 }
 
+Json of_evidence(const vision::Evidence& evidence) {
+  Json clues = Json::array();
+  for (const float clue : evidence.clues) clues.push_back(rounded(clue, 1e-5));
+  return clues;
+}
+vision::Evidence to_evidence(const Json& json) {
+  vision::Evidence evidence;
+  json.get_to(evidence.clues);
+  return evidence;
+}
+
 SceneLine to_scene(const Json& json) {
   SceneLine line;
   json.at("detector").get_to(line.detector);
@@ -53,10 +64,11 @@ SceneLine to_scene(const Json& json) {
   json.at("fill").get_to(line.fill);
   for (const Json& t : json.at("truths")) line.truths.push_back({to_pose(t.at("pose")), t.at("visible"), t.at("told")});
   for (const Json& d : json.at("detections"))
-    line.detections.push_back(
-        {to_pose(d.at("pose")), d.at("score"), d.at("visible"), d.at("nearest_mm"), to_covariance(d.at("covariance"))});
+    line.detections.push_back({to_pose(d.at("pose")), d.at("score"), d.at("visible"), d.at("nearest_mm"),
+                               to_covariance(d.at("covariance")), to_evidence(d.at("evidence"))});
   for (const Json& r : json.at("rejected"))
-    line.rejected.push_back({to_pose(r.at("pose")), r.at("score"), r.at("reason")});
+    line.rejected.push_back(
+        {to_pose(r.at("pose")), r.at("score"), r.at("nearest_mm"), to_evidence(r.at("evidence")), r.at("reason")});
   json.at("points").get_to(line.points);
   json.at("maxima").get_to(line.maxima);
   json.at("hypotheses").get_to(line.hypotheses);
@@ -94,9 +106,14 @@ std::string to_json(const SceneLine& line) {
                           {"score", d.score},
                           {"visible", d.visible},
                           {"nearest_mm", rounded(d.nearest_mm, 1e-3)},
-                          {"covariance", of_covariance(d.covariance)}});
+                          {"covariance", of_covariance(d.covariance)},
+                          {"evidence", of_evidence(d.evidence)}});
   for (const RejectionLine& r : line.rejected)
-    rejected.push_back({{"pose", of_pose(r.T_supply_object)}, {"score", r.score}, {"reason", r.reason}});
+    rejected.push_back({{"pose", of_pose(r.T_supply_object)},
+                        {"score", r.score},
+                        {"nearest_mm", rounded(r.nearest_mm, 1e-3)},
+                        {"evidence", of_evidence(r.evidence)},
+                        {"reason", r.reason}});
   Json& alive = json["alive"] = Json::array();
   for (const auto& [stage, distances] : line.alive) {
     Json numbers = Json::array();

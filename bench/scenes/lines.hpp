@@ -22,10 +22,13 @@ struct DetectionLine {
   double visible = 0;
   double nearest_mm = 0;  ///< To the nearest truth; for readers of the file.
   vision::Matrix6 covariance = vision::Matrix6::Zero();
+  vision::Evidence evidence;
 };
 struct RejectionLine {
   Eigen::Isometry3d T_supply_object = Eigen::Isometry3d::Identity();
   double score = 0;
+  double nearest_mm = 0;
+  vision::Evidence evidence;
   std::string reason;
 };
 struct FirstLine {

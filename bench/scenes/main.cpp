@@ -6,6 +6,7 @@
 
 #include "bench/scenes/ablation.hpp"
 #include "bench/scenes/alarms.hpp"
+#include "bench/scenes/calibrate.hpp"
 #include "bench/scenes/figure7.hpp"
 #include "bench/scenes/memory.hpp"
 #include "bench/scenes/noise_truth.hpp"
@@ -118,6 +119,9 @@ int main(int argc, char** argv) {
 
   CLI::App* table_command = app.add_subcommand("table", "print the figures of a run");
   table_command->add_option("folder", folder, "of the run")->required();
+  std::vector<std::string> folders;
+  CLI::App* calibrate_command = app.add_subcommand("calibrate", "fit the score's weights to what runs found");
+  calibrate_command->add_option("folders", folders, "of runs over the tune split")->required();
   CLI::App* noise_command = app.add_subcommand("noise", "the emulated LMS 400 looking at a table, beside a real one");
   noise_command->add_option("--cloud", cloud, "PLY file in mm to be looked at in the same way");
   CLI::App* memory_command = app.add_subcommand("memory", "used by this program itself")->group("");
@@ -130,6 +134,7 @@ int main(int argc, char** argv) {
     if (*search_command) search(options, selection, scenes);
     if (*ablation_command) ablation(options, selection, scenes);
     if (*noise_command) print_noise_truth(cloud);
+    if (*calibrate_command) calibrate(folders);
     if (*table_command) print_table(folder);
     if (*memory_command) measure_memory(folder);
   } catch (const std::exception& e) {

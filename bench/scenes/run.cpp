@@ -105,6 +105,7 @@ std::string RunOptions::base_file(const ScenePart& part) const {
 vision::DetectorOptions RunOptions::detector() const {
   vision::DetectorOptions detector;
   detector.threads = threads;
+  detector.rejections_max = 60;
   if (hypotheses_max > 0) detector.hypotheses_max = hypotheses_max;
   detector.without = {without.begin(), without.end()};
   return detector;
@@ -173,9 +174,10 @@ void detect_scene(const Scene& scene, const Judge& judge, const vision::Knowledg
   for (const Truth& t : scene.truths) line.truths.push_back({t.T_supply_object.iso, t.visible, t.told});
   for (const vision::Detection& d : report.detections)
     line.detections.push_back({d.T_supply_object.iso, d.score, d.visible_fraction,
-                               judge.nearest_mm(d.T_supply_object.iso, scene.truths), d.covariance});
+                               judge.nearest_mm(d.T_supply_object.iso, scene.truths), d.covariance, d.evidence});
   for (const vision::Rejection& r : report.rejected)
-    line.rejected.push_back({r.T_supply_object.iso, r.score, r.reason});
+    line.rejected.push_back(
+        {r.T_supply_object.iso, r.score, judge.nearest_mm(r.T_supply_object.iso, scene.truths), r.evidence, r.reason});
   if (report.first)
     line.first = FirstLine{line.image_ms + report.first->time_ms, report.first->hypotheses,
                            judge.nearest_mm(report.first->T_supply_object.iso, scene.truths) < judge.threshold_mm()};

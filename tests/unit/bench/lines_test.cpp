@@ -31,7 +31,9 @@ SceneLine a_scene(std::uint64_t number) {
   for (int r = 0; r < 6; ++r)
     for (int c = 0; c < 6; ++c) detection.covariance(r, c) = (r + 1) * (c + 1);
   line.detections = {detection};
-  line.rejected = {{Eigen::Isometry3d::Identity(), 0.2, "free space seen through it"}};
+  vision::Evidence evidence;
+  evidence[vision::Clue::Edges] = 0.25F;
+  line.rejected = {{Eigen::Isometry3d::Identity(), 0.2, 12.5, evidence, "free space seen through it"}};
   line.first = FirstLine{12.5, 7, true};
   line.alive = {{"votes", {0.25}}, {"sparse test", {0.5}}};
   line.stages_ms["votes"] = 3.5;
@@ -70,6 +72,8 @@ TEST_F(Folder, LinesComeBackAsTheyWere) {
   ASSERT_EQ(line.detections.size(), 1U);
   EXPECT_EQ(line.detections[0].covariance, expected.detections[0].covariance);
   EXPECT_EQ(line.rejected[0].reason, "free space seen through it");
+  EXPECT_EQ(line.rejected[0].nearest_mm, 12.5);
+  EXPECT_EQ(line.rejected[0].evidence[vision::Clue::Edges], 0.25F);
   ASSERT_TRUE(line.first);
   EXPECT_EQ(line.first->hypotheses, 7U);
   EXPECT_TRUE(line.first->right);

@@ -18,7 +18,7 @@ TEST(Draw, WritesAPngWithEverythingOnIt) {
       scenes::image_of(scenes::bracket_base().mesh(), {scenes::pose(-100, 0, 0, 0), scenes::pose(60, 20, 72, 1.5)}, 2);
   DetectionReport report = detect(image, scenes::kSupply, scenes::bracket_base(), scenes::options());
   ASSERT_FALSE(report.detections.empty());
-  report.rejected.push_back({report.detections[0].T_supply_object, 0.1, "edges missing"});
+  report.rejected.push_back({report.detections[0].T_supply_object, 0.1, {}, "edges missing"});
   const GraspChoice choice =
       choose_grasps(report, scenes::bracket_base().symmetry(), {Grasp{}}, scenes::kSupply, {4.0});
   ASSERT_FALSE(choice.reachable.empty());

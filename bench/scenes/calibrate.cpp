@@ -1,0 +1,126 @@
+#include "bench/scenes/calibrate.hpp"
+
+#include <Eigen/Cholesky>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <set>
+#include <stdexcept>
+
+#include "bench/scenes/classes.hpp"
+#include "bench/scenes/figures.hpp"
+#include "vision/score.hpp"
+
+namespace binpick::bench {
+namespace {
+using Terms = Eigen::Matrix<double, vision::kTerms, 1>;
+constexpr double kRidge = 0.3;
+constexpr int kSteps = 100;
+constexpr std::array kRivalScales{0.003, 0.004, 0.006, 0.008, 0.016, 0.03};
+
+struct Example {
+  Terms terms;
+  double rival = 0;
+  bool right = false;
+};
+
+Example example_of(const vision::Evidence& evidence, bool right) {
+  const auto terms = vision::terms_of(evidence);
+  return {Eigen::Map<const Terms>(terms.data()), evidence[vision::Clue::Rival], right};
+}
+
+bool overshadowed(const RejectionLine& rejection) {
+  return rejection.reason.find("better one") != std::string::npos || rejection.reason.starts_with("reaches through");
+}
+
+/// What one scene teaches.
+void add_scene(const SceneLine& scene, const Judge& judge, std::vector<Example>& examples) {
+  const Match found = match(judge.judged(scene), -1);
+  std::set<int> known;
+  for (std::size_t i = 0; i < scene.detections.size(); ++i) {
+    examples.push_back(example_of(scene.detections[i].evidence, found.verdict[i] != Verdict::Wrong));
+    if (found.truth[i] >= 0) known.insert(found.truth[i]);
+  }
+  for (const RejectionLine& r : scene.rejected) {
+    if (overshadowed(r)) continue;
+    int nearest = -1;
+    double least = judge.threshold_mm();
+    for (std::size_t k = 0; k < scene.truths.size(); ++k) {
+      const double d =
+          judge.measure(scene.truths[k].told).distance_mm(r.T_supply_object, scene.truths[k].T_supply_object);
+      if (d < least) least = d, nearest = static_cast<int>(k);
+    }
+    if (nearest >= 0 && known.contains(nearest)) continue;  // once more what is found already
+    examples.push_back(example_of(r.evidence, nearest >= 0));
+  }
+}
+
+struct Fit {
+  Terms weights = Terms::Zero();
+  double rival_scale = 0;
+  double loss = 0;  ///< Mean of -log of the probability of what was so.
+};
+
+double by_itself(const Fit& fit, const Example& e) { return 1 / (1 + std::exp(-fit.weights.dot(e.terms))); }
+
+double probability(const Fit& fit, const Example& e) {
+  return by_itself(fit, e) * vision::against_rival(e.rival, fit.rival_scale);
+}
+
+/// Maximum of the likelihood with a ridge, by scoring: Newton's method with the expected curvature.
+Fit fitted(const std::vector<Example>& examples, double rival_scale) {
+  Fit fit;
+  fit.rival_scale = rival_scale;
+  for (int step = 0; step < kSteps; ++step) {
+    Eigen::Matrix<double, vision::kTerms, vision::kTerms> curvature;
+    curvature.setIdentity();
+    curvature *= kRidge;
+    Terms gradient = -kRidge * fit.weights;
+    for (const Example& e : examples) {
+      const double own = by_itself(fit, e), all = probability(fit, e);
+      const double slope = all * (1 - own);  // of `all` by the logit
+      const double spread = std::max(1e-12, all * (1 - all));
+      gradient += ((e.right ? 1.0 : 0.0) - all) * slope / spread * e.terms;
+      curvature += slope * slope / spread * e.terms * e.terms.transpose();
+    }
+    const Terms delta = curvature.ldlt().solve(gradient);
+    fit.weights += delta;
+    if (delta.norm() < 1e-6) break;
+  }
+  for (const Example& e : examples) {
+    const double p = probability(fit, e);
+    fit.loss -= std::log(std::max(1e-12, e.right ? p : 1 - p)) / static_cast<double>(examples.size());
+  }
+  return fit;
+}
+}  // namespace
+
+void calibrate(const std::vector<std::string>& folders) {
+  std::vector<Example> examples;
+  std::map<std::string, Judge> judges;
+  for (const std::string& folder : folders)
+    for (const auto& [key, scene] : read_run(folder).scenes) {
+      if (scene.detector != "binpick") continue;
+      const auto it = judges.try_emplace(scene.scanner + ' ' + scene.part,
+                                         scene_part(find_setting(scene.scanner)->scanner, scene.part));
+      add_scene(scene, it.first->second, examples);
+    }
+  if (examples.empty()) throw std::runtime_error{"no scene to learn from"};
+  Fit best;
+  for (const double scale : kRivalScales)
+    if (const Fit fit = fitted(examples, scale); best.rival_scale == 0 || fit.loss < best.loss) best = fit;
+  std::vector<Believed> believed;
+  double right = 0;
+  for (const Example& e : examples) {
+    believed.push_back({probability(best, e), e.right});
+    right += e.right;
+  }
+  std::printf("// %zu poses, %.0f of them right; log loss %.4f, calibration error %.4f.\n", examples.size(), right,
+              best.loss, calibration_error(believed));
+  std::printf("constexpr double kRivalScale = %g;\nconstexpr std::array<double, kTerms> kWeights{", best.rival_scale);
+  for (std::size_t k = 0; k < vision::kTerms; ++k)
+    std::printf("%s%.4g", k == 0 ? "" : ", ", best.weights[static_cast<Eigen::Index>(k)]);
+  std::printf("};\n");
+}
+}  // namespace binpick::bench

@@ -1,0 +1,58 @@
+#include "vision/score.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace binpick::vision {
+namespace {
+#include "vision/score_weights.inc"
+}  // namespace
+
+Evidence evidence_of(const DenseTest& test) {
+  const auto pixels = static_cast<float>(std::max(1, test.pixels));
+  const auto seen = static_cast<float>(std::max(1, test.explained + test.contradicted));
+  Evidence e;
+  e[Clue::Visible] = test.visible_fraction();
+  e[Clue::Contradicted] = static_cast<float>(test.contradicted - test.contradicted_border) / seen;
+  e[Clue::Border] = static_cast<float>(test.contradicted_border) / seen;
+  e[Clue::Missing] = static_cast<float>(test.missing) / pixels;
+  e[Clue::Edges] = test.edge_ratio();
+  e[Clue::EdgeLength] = static_cast<float>(test.edges_found + test.edges_missing) / (4 * std::sqrt(pixels));
+  e[Clue::Normals] = test.normal_agreement;
+  e[Clue::Curvature] = test.bend_agreement;
+  e[Clue::Fit] = test.fit;
+  e[Clue::Size] = std::log10(static_cast<float>(std::max(1, test.explained)));
+  return e;
+}
+
+std::array<double, kTerms> terms_of(const Evidence& e) {
+  const auto at = [&](Clue clue) { return static_cast<double>(e[clue]); };
+  const auto root = [](double x) { return std::sqrt(std::max(0.0, x)); };
+  return {1.0,
+          std::min(0.3, at(Clue::Visible)),
+          std::max(0.0, at(Clue::Visible) - 0.3),
+          at(Clue::Contradicted),
+          root(at(Clue::Contradicted)),
+          at(Clue::Border),
+          at(Clue::Missing),
+          at(Clue::Edges),
+          at(Clue::Edges) * at(Clue::Edges),
+          std::min(1.0, at(Clue::EdgeLength)),
+          std::min(1.0, at(Clue::EdgeLength)) * at(Clue::Edges),
+          at(Clue::Normals),
+          at(Clue::Curvature),
+          at(Clue::Fit),
+          at(Clue::Size),
+          at(Clue::Looseness),
+          at(Clue::Claimed)};
+}
+
+double against_rival(double rival, double scale) { return 1 / (1 + std::exp((rival - 1) / scale)); }
+
+double score_of(const Evidence& evidence) {
+  const auto terms = terms_of(evidence);
+  double logit = 0;
+  for (std::size_t k = 0; k < kTerms; ++k) logit += kWeights[k] * terms[k];
+  return against_rival(static_cast<double>(evidence[Clue::Rival]), kRivalScale) / (1 + std::exp(-logit));
+}
+}  // namespace binpick::vision
