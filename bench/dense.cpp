@@ -2,7 +2,9 @@
 /// 600 triangles on 150 pixels, as a fine scanner sees it. The ratio of the lines counts, not the times.
 #include <benchmark/benchmark.h>
 #include <cmath>
+#include <limits>
 #include <numbers>
+#include <random>
 
 #include "vision/rotations.hpp"
 #include "vision/verification.hpp"
@@ -99,6 +101,27 @@ void draw(benchmark::State& state) {
   }
 }
 BENCHMARK(draw)->Unit(benchmark::kMicrosecond);
+/// 720 × 720 pixels of blocks on a slope, with noise, and one in forty missing.
+DepthImage blocks() {
+  DepthImage image;
+  image.pixel_mm = 0.2;
+  image.z_mm.resize(720, 720);
+  std::mt19937 random{1};
+  std::normal_distribution<float> noise{0, 0.05F};
+  for (Eigen::Index r = 0; r < 720; ++r)
+    for (Eigen::Index c = 0; c < 720; ++c)
+      image.z_mm(r, c) = random() % 40 == 0 ? std::numeric_limits<float>::quiet_NaN()
+                                            : static_cast<float>((r / 60 * 7 + c / 60 * 3) % 11) +
+                                                  0.04F * static_cast<float>(c % 60) + noise(random);
+  return image;
+}
+
+void prepare(benchmark::State& state, const kernels::Table& loops) {
+  const DepthImage image = blocks();
+  for (auto _ : state) benchmark::DoNotOptimize(prepare_scene(image, 0.05, 1, loops).z_mm.data());
+}
+BENCHMARK_CAPTURE(prepare, portable, kernels::portable())->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(prepare, chosen, kernels::table())->Unit(benchmark::kMillisecond);
 }  // namespace
 
 BENCHMARK_MAIN();

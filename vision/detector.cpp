@@ -86,7 +86,7 @@ class Detecting {
 
   DetectionReport run() {
     stage_start_ = SteadyClock::now();
-    scene_ = prepare_scene(image_, noise_mm_);
+    scene_ = prepare_scene(image_, noise_mm_, options_.threads);
     floor_mm_ = floor_of(scene_, supply_);
     lowest_allowed_mm_ =
         static_cast<float>(floor_mm_ - std::max(3 * noise_mm_, kFloorGateDiameters * coarseness() * part_.diameter_mm));

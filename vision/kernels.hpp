@@ -75,6 +75,17 @@ struct DenseSum {
   float weight = 0, bend_both = 0, bend_model = 0, bend_scene = 0;
 };
 
+/// What a row of the scene is written to, see Scene (scene.hpp).
+struct SurfaceRow {
+  float *slope_x = nullptr, *slope_y = nullptr, *bend_mm = nullptr;
+  float *edge_out_x = nullptr, *edge_out_y = nullptr;
+  std::uint8_t* edge = nullptr;
+};
+/// How far an edge looks over a hole for the surface beyond it.
+inline constexpr int kHoleReachPx = 3;
+/// Further away than that, no edge is known.
+inline constexpr int kEdgeReachPx = 16;
+
 /// A view (below 2^24) that passed the coarse test: the larger, the better; equal ones in the order of the views.
 constexpr std::uint32_t ranked(std::uint32_t view, int explained, int contradicted) {
   return static_cast<std::uint32_t>(32 + 2 * explained - contradicted) << 24 | (0xFFFFFFU - view);
@@ -128,6 +139,19 @@ struct Table {
   /// PixelState (verification.hpp) of the template's pixels, in its layout; writes nothing about eights of a row that
   /// are empty.
   void (*states)(const Picture& picture, const Drawn& drawn, std::uint8_t* states);
+
+  /// A row of a picture: what has too few neighbours on its own surface becomes NaN. Rows lie `stride` apart; here and
+  /// below as many pixels around the row are read as a loop looks far, and up to seven more.
+  void (*clean)(const float* z, std::ptrdiff_t stride, int cols, float jump_mm, int neighbours_min, float* out);
+  /// Plane through each pixel and its eight neighbours on the same surface, at the pixel.
+  void (*smooth)(const float* measured, std::ptrdiff_t stride, int cols, float jump_mm, float* z);
+  /// What the smoothed surface tells.
+  void (*surface)(const float* z, std::ptrdiff_t stride, int cols, float jump_mm, float per_mm, const SurfaceRow& out);
+  /// Distances to the next edge in each column, at most kEdgeReachPx, carried on to the next row.
+  void (*column_distance)(const std::uint8_t* edge, int cols, std::int16_t* distance);
+  /// From the column distances to both sides, the nearest edge of all; ways: room for cols + 2 kEdgeReachPx + 15.
+  void (*nearest_edges)(const std::int16_t* above, const std::int16_t* below, int cols, int row, std::int16_t* ways,
+                        float* distance_px, std::int32_t* nearest);
 };
 
 /// Best for this processor; the portable one where the environment has BINPICK_LOOPS=portable when it is first asked

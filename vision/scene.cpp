@@ -1,191 +1,115 @@
 #include "vision/scene.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <vector>
+
+#include "vision/team.hpp"
 
 namespace binpick::vision {
 namespace {
 constexpr float kNotMeasured = std::numeric_limits<float>::quiet_NaN();
+constexpr float kOutside = std::numeric_limits<float>::infinity();
 constexpr float kAbsurdMm = 1e6F;
 /// A pixel with fewer neighbours on its own surface is a mixed echo at an edge or dirt in the air.
 constexpr int kNeighboursMin = 2;
-/// How far an edge looks over a hole for the surface beyond it.
-constexpr int kHoleReachPx = 3;
+/// So many rows are one piece of work.
+constexpr int kBlockRows = 64;
 
-struct Step {
-  int row, col;
-};
-constexpr std::array<Step, 8> kNeighbours{{{0, 1}, {1, 1}, {1, 0}, {1, -1}, {0, -1}, {-1, -1}, {-1, 0}, {-1, 1}}};
+/// Rows of heights with as many around them as the inner loops may look at.
+class Padded {
+ public:
+  Padded(int rows, int cols)
+      : stride_{cols + 2 * kMarginPx + static_cast<int>(kernels::kLanes)},
+        z_mm_(static_cast<std::size_t>(rows + 2 * kMarginPx) * static_cast<std::size_t>(stride_), kOutside) {}
+  float* row(int r) { return z_mm_.data() + static_cast<std::ptrdiff_t>(r + kMarginPx) * stride_ + kMarginPx; }
+  std::ptrdiff_t stride() const { return stride_; }
 
-Grid<float> without_specks(const Grid<float>& z, float jump_mm) {
-  Grid<float> clean = z;
-  const auto rows = static_cast<int>(z.rows()), cols = static_cast<int>(z.cols());
-  for (int r = 0; r < rows; ++r)
-    for (int c = 0; c < cols; ++c) {
-      if (std::isnan(z(r, c))) continue;
-      int same = 0;
-      for (const Step& step : kNeighbours) {
-        const int nr = r + step.row, nc = c + step.col;
-        if (nr < 0 || nc < 0 || nr >= rows || nc >= cols) continue;
-        same += std::abs(z(nr, nc) - z(r, c)) <= jump_mm;
-      }
-      if (same < kNeighboursMin) clean(r, c) = kNotMeasured;
-    }
-  return clean;
-}
-
-struct Plane {
-  float z, slope_x, slope_y;
+ private:
+  static constexpr int kMarginPx = kernels::kHoleReachPx;
+  std::ptrdiff_t stride_;
+  std::vector<float> z_mm_;
 };
 
-/// Least-squares plane through the pixels within `radius` on the same surface as (row, col), slopes per pixel.
-Plane fit_plane(const Grid<float>& z, int row, int col, int radius, float centre_mm, float jump_mm) {
-  const auto rows = static_cast<int>(z.rows()), cols = static_cast<int>(z.cols());
-  float n = 0, sx = 0, sy = 0, sz = 0, sxx = 0, sxy = 0, syy = 0, sxz = 0, syz = 0;
-  for (int r = std::max(0, row - radius); r <= std::min(rows - 1, row + radius); ++r)
-    for (int c = std::max(0, col - radius); c <= std::min(cols - 1, col + radius); ++c) {
-      const float d = z(r, c) - centre_mm;
-      if (!(std::abs(d) <= jump_mm)) continue;
-      const auto x = static_cast<float>(c - col), y = static_cast<float>(r - row);
-      n += 1, sx += x, sy += y, sz += d, sxx += x * x, sxy += x * y, syy += y * y, sxz += x * d, syz += y * d;
-    }
-  if (n < 1) return {centre_mm, 0, 0};
-  const float mx = sx / n, my = sy / n, mz = sz / n;
-  const float cxx = sxx - n * mx * mx, cxy = sxy - n * mx * my, cyy = syy - n * my * my;
-  const float cxz = sxz - n * mx * mz, cyz = syz - n * my * mz;
-  const float determinant = cxx * cyy - cxy * cxy;
-  if (n < 4 || determinant < 0.5F) return {centre_mm + mz, 0, 0};
-  const float a = (cxz * cyy - cyz * cxy) / determinant, b = (cyz * cxx - cxz * cxy) / determinant;
-  return {centre_mm + mz - a * mx - b * my, a, b};
+/// Calls work(first, last) for blocks of rows.
+template <class Work>
+void share_rows(int threads, int rows, const Work& work) {
+  share(threads, static_cast<std::size_t>((rows + kBlockRows - 1) / kBlockRows), Deadline{},
+        [&](std::size_t block, int) {
+          const int first = static_cast<int>(block) * kBlockRows;
+          work(first, std::min(rows, first + kBlockRows));
+        });
 }
 
-void fit_planes(Scene& scene) {
+void remove_specks(const DepthImage& image, int first, int last, const kernels::Table& loops, Padded& measured,
+                   Scene& scene) {
   const int rows = scene.rows(), cols = scene.cols();
-  const Grid<float>& measured = scene.measured_mm;
-  for (int r = 0; r < rows; ++r)
-    for (int c = 0; c < cols; ++c)
-      if (!std::isnan(measured(r, c))) scene.z_mm(r, c) = fit_plane(measured, r, c, 1, measured(r, c), scene.jump_mm).z;
-  const auto per_mm = static_cast<float>(1 / scene.pixel_mm);
-  for (int r = 0; r < rows; ++r)
-    for (int c = 0; c < cols; ++c) {
-      if (std::isnan(scene.z_mm(r, c))) continue;
-      const Plane plane = fit_plane(scene.z_mm, r, c, 2, scene.z_mm(r, c), 1.25F * scene.jump_mm);
-      scene.slope_x(r, c) = plane.slope_x * per_mm;
-      scene.slope_y(r, c) = plane.slope_y * per_mm;
-    }
-}
-
-void find_bend(Scene& scene) {
-  constexpr std::array<Step, 4> kPairs{{{0, 2}, {2, 0}, {2, 2}, {2, -2}}};
-  for (int r = 2; r < scene.rows() - 2; ++r)
-    for (int c = 2; c < scene.cols() - 2; ++c) {
-      const float centre = scene.z_mm(r, c);
-      float sum = 0;
-      int pairs = 0;
-      for (const Step& step : kPairs) {
-        const float a = scene.z_mm(r + step.row, c + step.col), b = scene.z_mm(r - step.row, c - step.col);
-        if (!(std::abs(a - centre) <= scene.jump_mm && std::abs(b - centre) <= scene.jump_mm)) continue;
-        sum += a + b - 2 * centre;
-        ++pairs;
-      }
-      if (pairs >= 2) scene.bend_mm(r, c) = sum / static_cast<float>(pairs);
-    }
-}
-
-/// Whether the surface at (row, col) ends in this direction: the next measured pixel lies a jump lower, or there is a
-/// hole too wide to be a missing point.
-bool ends(const Scene& scene, int row, int col, const Step& step) {
-  const float z = scene.z_mm(row, col);
-  for (int k = 1; k <= kHoleReachPx; ++k) {
-    const int r = row + k * step.row, c = col + k * step.col;
-    if (!scene.inside(r, c)) return false;
-    if (!std::isnan(scene.z_mm(r, c)))
-      return z - scene.z_mm(r, c) > scene.jump_mm * static_cast<float>(k == 1 ? 1 : 1.5);
+  Padded finite(last - first + 2, cols);
+  for (int r = std::max(0, first - 1); r < std::min(rows, last + 1); ++r) {
+    const float* from = image.z_mm.row(r).data();
+    float* to = finite.row(r - first + 1);
+    for (int c = 0; c < cols; ++c) to[c] = std::abs(from[c]) < kAbsurdMm ? from[c] : kNotMeasured;
   }
-  return true;
+  for (int r = first; r < last; ++r) {
+    loops.clean(finite.row(r - first + 1), finite.stride(), cols, scene.jump_mm, kNeighboursMin, measured.row(r));
+    std::copy_n(measured.row(r), cols, scene.measured_mm.row(r).data());
+  }
 }
 
-void find_edges(Scene& scene) {
-  for (int r = 0; r < scene.rows(); ++r)
-    for (int c = 0; c < scene.cols(); ++c) {
-      if (std::isnan(scene.z_mm(r, c))) continue;
-      float x = 0, y = 0;
-      bool straight = false;
-      for (std::size_t k = 0; k < kNeighbours.size(); ++k)
-        if (ends(scene, r, c, kNeighbours[k])) {
-          const float length = k % 2 == 0 ? 1.0F : std::numbers::sqrt2_v<float>;
-          x += static_cast<float>(kNeighbours[k].col) / length;
-          y += static_cast<float>(kNeighbours[k].row) / length;
-          straight |= k % 2 == 0;
-        }
-      const float norm = std::hypot(x, y);
-      if (!straight || norm < 1e-3F) continue;
-      scene.edge(r, c) = 1;
-      scene.edge_out_x(r, c) = x / norm;
-      scene.edge_out_y(r, c) = y / norm;
-    }
-}
-
-/// Nearest edge by two sweeps of vector propagation (Danielsson 1980): exact to a fraction of a pixel.
-void spread_edges(Scene& scene) {
+/// The nearest edge of all within reach: first along the columns, from above and from below, then along the row
+/// (Felzenszwalb and Huttenlocher, 2012, with a bound).
+void spread_edges(int first, int last, const kernels::Table& loops, Scene& scene) {
   const int rows = scene.rows(), cols = scene.cols();
-  const auto distance = [&](int r, int c, std::int32_t index) {
-    if (index < 0) return std::numeric_limits<float>::max();
-    const auto dr = static_cast<float>(index / cols - r), dc = static_cast<float>(index % cols - c);
-    return dr * dr + dc * dc;
-  };
-  Grid<std::int32_t>& nearest = scene.nearest_edge;
-  for (int r = 0; r < rows; ++r)
-    for (int c = 0; c < cols; ++c) nearest(r, c) = scene.edge(r, c) ? r * cols + c : -1;
-  const auto relax = [&](int r, int c, int nr, int nc) {
-    if (nr < 0 || nc < 0 || nr >= rows || nc >= cols) return;
-    if (distance(r, c, nearest(nr, nc)) < distance(r, c, nearest(r, c))) nearest(r, c) = nearest(nr, nc);
-  };
-  for (int r = 0; r < rows; ++r) {
-    for (int c = 0; c < cols; ++c)
-      for (const Step& s : {Step{-1, 0}, {0, -1}, {-1, -1}, {-1, 1}}) relax(r, c, r + s.row, c + s.col);
-    for (int c = cols - 1; c >= 0; --c) relax(r, c, r, c + 1);
+  const auto width = static_cast<std::size_t>(cols);
+  std::vector<std::int16_t> below(width * static_cast<std::size_t>(last - first)), ways(width + 2 * kEdgeReachPx + 16);
+  std::vector<std::int16_t> distance(width, kEdgeReachPx);
+  for (int r = std::min(rows, last + kEdgeReachPx) - 1; r >= first; --r) {
+    loops.column_distance(scene.edge.row(r).data(), cols, distance.data());
+    if (r < last)
+      std::copy(distance.begin(), distance.end(), below.data() + width * static_cast<std::size_t>(r - first));
   }
-  for (int r = rows - 1; r >= 0; --r) {
-    for (int c = cols - 1; c >= 0; --c)
-      for (const Step& s : {Step{1, 0}, {0, 1}, {1, -1}, {1, 1}}) relax(r, c, r + s.row, c + s.col);
-    for (int c = 0; c < cols; ++c) relax(r, c, r, c - 1);
+  std::fill(distance.begin(), distance.end(), std::int16_t{kEdgeReachPx});
+  for (int r = std::max(0, first - kEdgeReachPx); r < last; ++r) {
+    loops.column_distance(scene.edge.row(r).data(), cols, distance.data());
+    if (r >= first)
+      loops.nearest_edges(distance.data(), below.data() + width * static_cast<std::size_t>(r - first), cols, r,
+                          ways.data(), scene.edge_distance_px.row(r).data(), scene.nearest_edge.row(r).data());
   }
-  for (int r = 0; r < rows; ++r)
-    for (int c = 0; c < cols; ++c) {
-      const float d = nearest(r, c) < 0 ? kEdgeReachPx : std::sqrt(distance(r, c, nearest(r, c)));
-      scene.edge_distance_px(r, c) = std::min(d, static_cast<float>(kEdgeReachPx));
-      if (d >= kEdgeReachPx) nearest(r, c) = -1;
-    }
 }
 }  // namespace
 
 float jump_of(double noise_mm, double pixel_mm) { return static_cast<float>(std::max(4 * noise_mm, 1.2 * pixel_mm)); }
 
-Scene prepare_scene(const DepthImage& image, double noise_mm) {
+Scene prepare_scene(const DepthImage& image, double noise_mm, int threads, const kernels::Table& loops) {
   Scene scene;
   scene.pixel_mm = image.pixel_mm;
   scene.origin_mm = image.origin_mm;
   scene.noise_mm = noise_mm;
   scene.jump_mm = jump_of(noise_mm, image.pixel_mm);
-  const Eigen::Index rows = image.z_mm.rows(), cols = image.z_mm.cols();
-  const Grid<float> finite =
-      image.z_mm.unaryExpr([](float z) { return std::isfinite(z) && std::abs(z) < kAbsurdMm ? z : kNotMeasured; });
-  scene.measured_mm = without_specks(finite, scene.jump_mm);
-  scene.z_mm = Grid<float>::Constant(rows, cols, kNotMeasured);
-  for (Grid<float>* grid : {&scene.slope_x, &scene.slope_y, &scene.bend_mm, &scene.edge_out_x, &scene.edge_out_y})
-    *grid = Grid<float>::Zero(rows, cols);
-  scene.edge = Grid<std::uint8_t>::Zero(rows, cols);
-  scene.edge_distance_px = Grid<float>::Constant(rows, cols, kEdgeReachPx);
-  scene.nearest_edge = Grid<std::int32_t>::Constant(rows, cols, -1);
-  fit_planes(scene);
-  find_bend(scene);
-  find_edges(scene);
-  spread_edges(scene);
+  const auto rows = static_cast<int>(image.z_mm.rows()), cols = static_cast<int>(image.z_mm.cols());
+  for (Grid<float>* grid : {&scene.measured_mm, &scene.z_mm, &scene.slope_x, &scene.slope_y, &scene.bend_mm,
+                            &scene.edge_out_x, &scene.edge_out_y, &scene.edge_distance_px})
+    grid->resize(rows, cols);
+  scene.edge.resize(rows, cols);
+  scene.nearest_edge.resize(rows, cols);
+
+  Padded measured(rows, cols), smooth(rows, cols);
+  share_rows(threads, rows, [&](int first, int last) { remove_specks(image, first, last, loops, measured, scene); });
+  share_rows(threads, rows, [&](int first, int last) {
+    for (int r = first; r < last; ++r) {
+      loops.smooth(measured.row(r), measured.stride(), cols, scene.jump_mm, smooth.row(r));
+      std::copy_n(smooth.row(r), cols, scene.z_mm.row(r).data());
+    }
+  });
+  const auto per_mm = static_cast<float>(1 / image.pixel_mm);
+  share_rows(threads, rows, [&](int first, int last) {
+    for (int r = first; r < last; ++r)
+      loops.surface(smooth.row(r), smooth.stride(), cols, scene.jump_mm, per_mm,
+                    {scene.slope_x.row(r).data(), scene.slope_y.row(r).data(), scene.bend_mm.row(r).data(),
+                     scene.edge_out_x.row(r).data(), scene.edge_out_y.row(r).data(), scene.edge.row(r).data()});
+  });
+  share_rows(threads, rows, [&](int first, int last) { spread_edges(first, last, loops, scene); });
   return scene;
 }
 }  // namespace binpick::vision

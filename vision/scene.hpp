@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "vision/depth_image.hpp"
+#include "vision/kernels.hpp"
 
 /// The measured surface as detection looks at it: smoothed within each piece of surface, with slopes, bend and depth
 /// edges.
@@ -33,10 +34,12 @@ struct Scene {
   int cols() const { return static_cast<int>(z_mm.cols()); }
   bool inside(int row, int col) const { return row >= 0 && col >= 0 && row < rows() && col < cols(); }
 };
-inline constexpr int kEdgeReachPx = 16;
+inline constexpr int kEdgeReachPx = kernels::kEdgeReachPx;
 
-/// Values that are not finite, or absurd (over a kilometre), count as not measured.
-Scene prepare_scene(const DepthImage& image, double noise_mm);
+/// Values that are not finite, or absurd (over a kilometre), count as not measured. The result does not depend on the
+/// number of threads.
+Scene prepare_scene(const DepthImage& image, double noise_mm, int threads = 1,
+                    const kernels::Table& loops = kernels::table());
 /// Height difference of neighbouring pixels that is a jump rather than noise or slope.
 float jump_of(double noise_mm, double pixel_mm);
 }  // namespace binpick::vision
