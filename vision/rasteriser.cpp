@@ -108,7 +108,7 @@ void Rasteriser::draw(const Eigen::Matrix3f& R, const Eigen::Vector3f& t, double
   const std::size_t pixels =
       static_cast<std::size_t>(out.rows + 2 * Template::kMarginPx) * static_cast<std::size_t>(out.stride);
   out.top_mm.assign(pixels, -std::numeric_limits<float>::infinity());
-  out.bottom_mm.assign(pixels, std::numeric_limits<float>::infinity());
+  if (bottoms || !outward_) out.bottom_mm.assign(pixels, std::numeric_limits<float>::infinity());
   out.triangle.assign(pixels, -1);
 
   for (std::size_t i = 0; i < points_; ++i) {
@@ -126,12 +126,10 @@ void Rasteriser::draw(const Eigen::Matrix3f& R, const Eigen::Vector3f& t, double
                         !outward_ ? kernels::Faces::Both
                         : bottoms ? kernels::Faces::ByOrientation
                                   : kernels::Faces::Top);
-  for (std::size_t i = 0; i < pixels; ++i) {
-    if (out.triangle[i] < 0)
-      out.top_mm[i] = out.bottom_mm[i] = kNothing;
-    else  // a knife's edge may be seen from above only
-      out.bottom_mm[i] = std::min(out.bottom_mm[i], out.top_mm[i]);
-  }
+  for (std::size_t i = 0; i < pixels; ++i) out.top_mm[i] = out.triangle[i] < 0 ? kNothing : out.top_mm[i];
+  if (!bottoms) return;
+  for (std::size_t i = 0; i < pixels; ++i)  // a knife's edge may be seen from above only
+    out.bottom_mm[i] = out.triangle[i] < 0 ? kNothing : std::min(out.bottom_mm[i], out.top_mm[i]);
 }
 
 std::unique_ptr<DepthRenderer> make_working_renderer(const Mesh& mesh) {
