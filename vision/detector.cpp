@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <mutex>
+#include <utility>
 
 #include "base/check.hpp"
 #include "vision/candidates.hpp"
@@ -41,6 +42,12 @@ constexpr double kValidScore = 0.5;
 constexpr std::array<std::string_view, 10> kAdditions{"edges",        "first look",  "turned",      "rooms",
                                                       "explain away", "second pass", "all anchors", "second refinement",
                                                       "normals",      "curvature"};
+
+/// The memory of the last scene, for the next one of this thread.
+Scene& spare_scene() {
+  thread_local Scene spare;
+  return spare;
+}
 
 /// Supply's floor: known, or found as the level below which there is nothing and on which much lies, or unknown.
 float floor_of(const Scene& scene, const SupplyBox& supply) {
@@ -86,7 +93,7 @@ class Detecting {
 
   DetectionReport run() {
     stage_start_ = SteadyClock::now();
-    scene_ = prepare_scene(image_, noise_mm_, options_.threads);
+    scene_ = prepare_scene(image_, noise_mm_, options_.threads, kernels::table(), std::exchange(spare_scene(), {}));
     floor_mm_ = floor_of(scene_, supply_);
     lowest_allowed_mm_ =
         static_cast<float>(floor_mm_ - std::max(3 * noise_mm_, kFloorGateDiameters * coarseness() * part_.diameter_mm));
@@ -113,6 +120,7 @@ class Detecting {
     ended("selection");
     observed("selection", report_.detections, [](const Detection& d) { return d.T_supply_object.iso; });
     report_.time_ms = milliseconds_since(start_);
+    spare_scene() = std::move(scene_);
     return std::move(report_);
   }
 

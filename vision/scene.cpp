@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "vision/team.hpp"
@@ -20,15 +21,19 @@ constexpr int kBlockRows = 64;
 /// Rows of heights with as many around them as the inner loops may look at.
 class Padded {
  public:
-  Padded(int rows, int cols)
-      : stride_{cols + 2 * kMarginPx + static_cast<int>(kernels::kLanes)},
-        z_mm_(static_cast<std::size_t>(rows + 2 * kMarginPx) * static_cast<std::size_t>(stride_), kOutside) {}
+  void resize(int rows, int cols) {
+    if (rows == rows_ && cols == cols_) return;  // what lies around the rows is never written to
+    rows_ = rows, cols_ = cols;
+    stride_ = cols + 2 * kMarginPx + static_cast<int>(kernels::kLanes);
+    z_mm_.assign(static_cast<std::size_t>(rows + 2 * kMarginPx) * static_cast<std::size_t>(stride_), kOutside);
+  }
   float* row(int r) { return z_mm_.data() + static_cast<std::ptrdiff_t>(r + kMarginPx) * stride_ + kMarginPx; }
   std::ptrdiff_t stride() const { return stride_; }
 
  private:
   static constexpr int kMarginPx = kernels::kHoleReachPx;
-  std::ptrdiff_t stride_;
+  int rows_ = 0, cols_ = 0;
+  std::ptrdiff_t stride_ = 0;
   std::vector<float> z_mm_;
 };
 
@@ -45,7 +50,8 @@ void share_rows(int threads, int rows, const Work& work) {
 void remove_specks(const DepthImage& image, int first, int last, const kernels::Table& loops, Padded& measured,
                    Scene& scene) {
   const int rows = scene.rows(), cols = scene.cols();
-  Padded finite(last - first + 2, cols);
+  Padded finite;
+  finite.resize(last - first + 2, cols);
   for (int r = std::max(0, first - 1); r < std::min(rows, last + 1); ++r) {
     const float* from = image.z_mm.row(r).data();
     float* to = finite.row(r - first + 1);
@@ -81,8 +87,8 @@ void spread_edges(int first, int last, const kernels::Table& loops, Scene& scene
 
 float jump_of(double noise_mm, double pixel_mm) { return static_cast<float>(std::max(4 * noise_mm, 1.2 * pixel_mm)); }
 
-Scene prepare_scene(const DepthImage& image, double noise_mm, int threads, const kernels::Table& loops) {
-  Scene scene;
+Scene prepare_scene(const DepthImage& image, double noise_mm, int threads, const kernels::Table& loops, Scene memory) {
+  Scene scene = std::move(memory);
   scene.pixel_mm = image.pixel_mm;
   scene.origin_mm = image.origin_mm;
   scene.noise_mm = noise_mm;
@@ -94,7 +100,13 @@ Scene prepare_scene(const DepthImage& image, double noise_mm, int threads, const
   scene.edge.resize(rows, cols);
   scene.nearest_edge.resize(rows, cols);
 
-  Padded measured(rows, cols), smooth(rows, cols);
+  struct Scratch {
+    Padded measured, smooth;
+  };
+  thread_local Scratch own;
+  Padded &measured = own.measured, &smooth = own.smooth;  // this thread's, whoever works on them
+  measured.resize(rows, cols);
+  smooth.resize(rows, cols);
   share_rows(threads, rows, [&](int first, int last) { remove_specks(image, first, last, loops, measured, scene); });
   share_rows(threads, rows, [&](int first, int last) {
     for (int r = first; r < last; ++r) {

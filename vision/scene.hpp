@@ -37,9 +37,10 @@ struct Scene {
 inline constexpr int kEdgeReachPx = kernels::kEdgeReachPx;
 
 /// Values that are not finite, or absurd (over a kilometre), count as not measured. The result does not depend on the
-/// number of threads.
+/// number of threads. `memory`: a scene that is done with; to get memory anew from the system takes longer than to
+/// prepare the scene.
 Scene prepare_scene(const DepthImage& image, double noise_mm, int threads = 1,
-                    const kernels::Table& loops = kernels::table());
+                    const kernels::Table& loops = kernels::table(), Scene memory = {});
 /// Height difference of neighbouring pixels that is a jump rather than noise or slope.
 float jump_of(double noise_mm, double pixel_mm);
 }  // namespace binpick::vision

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <limits>
 #include <random>
+#include <utility>
 
 /// The prepared scene against plain loops over its pixels.
 namespace binpick::vision {
@@ -171,7 +172,7 @@ TEST_P(PreparedScene, KnowsTheNearestEdgeOfEachPixel) {
   EXPECT_LT(in_reach, 70 * 83);
 }
 
-TEST_P(PreparedScene, DoesNotDependOnThreadsAndTakesAnySize) {
+TEST_P(PreparedScene, DoesNotDependOnThreadsOrMemoryAndTakesAnySize) {
   const auto same = [](const Scene& a, const Scene& b) {
     const auto equal = [](const auto& x, const auto& y) { return ((x == y) || (x != x && y != y)).all(); };
     return equal(a.measured_mm, b.measured_mm) && equal(a.z_mm, b.z_mm) && equal(a.slope_x, b.slope_x) &&
@@ -183,6 +184,8 @@ TEST_P(PreparedScene, DoesNotDependOnThreadsAndTakesAnySize) {
     const Scene one = prepare_scene(rough(rows, cols), 0.5, 1, *GetParam());
     EXPECT_EQ(one.rows(), rows);
     EXPECT_TRUE(same(one, prepare_scene(rough(rows, cols), 0.5, 3, *GetParam()))) << rows;
+    Scene other = prepare_scene(rough(60, 70), 0.5, 1, *GetParam());
+    EXPECT_TRUE(same(one, prepare_scene(rough(rows, cols), 0.5, 1, *GetParam(), std::move(other)))) << rows;
   }
 }
 }  // namespace
