@@ -62,14 +62,16 @@ Candidate Finisher::finished(Pose pose, Template& drawn) const {
   options.edge_gate_from_px = edge_gate_px(4, 0.04);
   for (int round = 0; round < (options_.second_refinement ? 2 : 1); ++round) {
     rasteriser_.draw(pose.R, pose.t, scene_.pixel_mm, scene_.origin_mm, drawn, false);
+    if (round > 0 && (candidate.test = dense_test(scene_, rasteriser_, pose, drawn)).evidence < 0) break;
     const ModelPoints points = model_points(scene_, rasteriser_, pose, drawn, 400, edge_points);
     candidate.information = refine(scene_, points, pose.R * centroid_ + pose.t, options, pose);
     options.gate_from_mm = options.gate_to_mm = std::max(3.5F * static_cast<float>(scene_.noise_mm), tolerance);
     options.edge_gate_from_px = 2;
     options.single_heights = true;
   }
-  rasteriser_.draw(pose.R, pose.t, scene_.pixel_mm, scene_.origin_mm, drawn, false);
   candidate.pose = pose;
+  if (candidate.test.evidence < 0) return candidate;  // hopeless
+  rasteriser_.draw(pose.R, pose.t, scene_.pixel_mm, scene_.origin_mm, drawn, false);
   candidate.test = dense_test(scene_, rasteriser_, pose, drawn);
   candidate.test.evidence -= kMissingWeight * static_cast<float>(candidate.test.missing);
   candidate.evidence = evidence_of(candidate.test);

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <mutex>
 #include <utility>
 
@@ -20,7 +21,11 @@ using SteadyClock = std::chrono::steady_clock;
 
 /// How many hypotheses of a pass survive each stage. Thousands are cheap to test and dear to lose; only distinct
 /// survivors pay for a rendered test.
-constexpr double kSparseBest = 2000, kDistinctBest = 300, kRenderedBest = 100, kTurnedBest = 16;
+constexpr double kSparseBest = 2000, kNudgedBest = 600, kDistinctBest = 300, kRenderedBest = 100, kTurnedBest = 16;
+/// Two of them are one if their centres and rotations are no further apart than this.
+constexpr double kThinDiameters = 0.06, kThinGaps = 2.0;
+/// Samples of the first steps of refinement.
+constexpr std::size_t kQuickSurface = 48, kQuickEdges = 24, kAll = 1000;
 /// So many of each maximum stay, whatever those of others are worth.
 constexpr std::size_t kOfEachMaximum = 6;
 /// So many poses of one place are enough: a well-seen object must not crowd out the others.
@@ -142,6 +147,7 @@ class Detecting {
     }
     ended("sparse test");
     remember("sparse test", hypotheses, [](const Hypothesis& h) { return h.pose.iso(); });
+    hypotheses = thinned(std::move(hypotheses));
     nudge(hypotheses);
     hypotheses = distinct(std::move(hypotheses), most(kDistinctBest), kCrowdMax);
     ended("first refinement");
@@ -308,21 +314,63 @@ class Detecting {
     return hypotheses;
   }
 
-  /// A few steps of refinement on the view's own samples, then the sparse test again, more strictly.
+  /// Of those that start from nearly the same pose the strongest: refinement would make them one.
+  std::vector<Hypothesis> thinned(std::vector<Hypothesis> hypotheses) const {
+    std::stable_sort(hypotheses.begin(), hypotheses.end(), stronger);
+    const auto cell_mm = static_cast<float>(kThinDiameters * part_.diameter_mm);
+    const auto same_turn = static_cast<float>(std::cos(0.5 * kThinGaps * part_.rotation_gap_rad));
+    std::map<std::array<int, 3>, std::vector<std::pair<Eigen::Vector3f, Eigen::Quaternionf>>> cells;
+    std::vector<Hypothesis> kept;
+    for (Hypothesis& h : hypotheses) {
+      const Eigen::Vector3f centre = h.pose.R * centroid_ + h.pose.t;
+      const Eigen::Quaternionf& turn = part_.views[h.view].R_supply_object;
+      const Eigen::Array3i cell = (centre / cell_mm).array().floor().cast<int>();
+      bool again = false;
+      for (int k = 0; k < 27 && !again; ++k) {
+        const auto it = cells.find({cell.x() + k % 3 - 1, cell.y() + k / 3 % 3 - 1, cell.z() + k / 9 - 1});
+        if (it == cells.end()) continue;
+        again = std::any_of(it->second.begin(), it->second.end(), [&](const auto& other) {
+          return (other.first - centre).norm() < cell_mm && std::abs(other.second.dot(turn)) > same_turn;
+        });
+      }
+      if (again) continue;
+      cells[{cell.x(), cell.y(), cell.z()}].emplace_back(centre, turn);
+      kept.push_back(std::move(h));
+    }
+    return kept;
+  }
+
+  /// Refinement on the view's own samples: two steps on few of them for all, then, for the best, some more on all;
+  /// each time the sparse test again, more strictly.
   void nudge(std::vector<Hypothesis>& hypotheses) const {
     const float tolerance = tolerance_of(scene_);
     RefineOptions options;
-    options.steps = 5;
     options.gate_from_mm = std::max(3 * tolerance, static_cast<float>(0.06 * part_.diameter_mm));
     options.gate_to_mm = std::max(2 * tolerance, static_cast<float>(0.03 * part_.diameter_mm));
     options.edge_gate_from_px = finish_.edge_gate_px(6, 0.08);
     options.edge_gate_to_px = finish_.edge_gate_px(3, 0.03);
-    share(options_.threads, hypotheses.size(), deadline_, [&](std::size_t i, int) {
-      Hypothesis& h = hypotheses[i];
-      const View& view = part_.views[h.view];
-      refine(scene_, model_points(view, h.pose), h.pose.R * centroid_ + h.pose.t, options, h.pose);
-      h.evidence = sparse_evidence(scene_, part_, h.view, h.pose, 2 * tolerance);
-    });
+    const float edge_gate_to_px = options.edge_gate_to_px, gate_to_mm = options.gate_to_mm;
+    const auto refine_all = [&](std::size_t surface_max, std::size_t edges_max, float evidence_mm) {
+      share(options_.threads, hypotheses.size(), deadline_, [&](std::size_t i, int) {
+        Hypothesis& h = hypotheses[i];
+        refine(scene_, model_points(part_.views[h.view], h.pose, surface_max, edges_max),
+               h.pose.R * centroid_ + h.pose.t, options, h.pose);
+        h.evidence = sparse_evidence(scene_, part_, h.view, h.pose, evidence_mm);
+      });
+    };
+    options.steps = 2;
+    options.gate_to_mm = 0.5F * (options.gate_from_mm + gate_to_mm);
+    options.edge_gate_to_px = 0.5F * (options.edge_gate_from_px + edge_gate_to_px);
+    refine_all(kQuickSurface, with("edges") ? kQuickEdges : 0, 3 * tolerance);
+    std::stable_sort(hypotheses.begin(), hypotheses.end(), stronger);
+    if (hypotheses.size() > most(kNudgedBest))
+      hypotheses.erase(hypotheses.begin() + static_cast<std::ptrdiff_t>(most(kNudgedBest)), hypotheses.end());
+    options.steps = 3;
+    options.gate_from_mm = options.gate_to_mm;
+    options.edge_gate_from_px = options.edge_gate_to_px;
+    options.gate_to_mm = gate_to_mm;
+    options.edge_gate_to_px = edge_gate_to_px;
+    refine_all(kAll, with("edges") ? kAll : 0, 2 * tolerance);
   }
 
   std::vector<Hypothesis> distinct(std::vector<Hypothesis> hypotheses, std::size_t most, std::size_t crowd) const {

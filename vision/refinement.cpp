@@ -58,12 +58,14 @@ void ModelPoints::add_edge(const Eigen::Vector3f& p, const Eigen::Vector2f& out)
   append<5>(edges, edge_count++, {p.x(), p.y(), p.z(), out.x(), out.y()});
 }
 
-ModelPoints model_points(const View& view, const Pose& pose) {
+ModelPoints model_points(const View& view, const Pose& pose, std::size_t surface_max, std::size_t edges_max) {
   const Eigen::Matrix3f turn = pose.R * view.R_supply_object.toRotationMatrix().transpose();
   const Eigen::Vector3f anchor = pose.R * view.anchors_object_mm.front() + pose.t;
   ModelPoints model;
-  for (const SurfaceSample& sample : view.surface) model.add_surfel(anchor + turn * sample.p_mm, turn * sample.normal);
-  for (const Eigen::Vector3f& edge : view.edges_mm) model.add_edge(anchor + turn * edge, Eigen::Vector2f::Zero());
+  for (const SurfaceSample& sample : view.surface.first(std::min(surface_max, view.surface.size())))
+    model.add_surfel(anchor + turn * sample.p_mm, turn * sample.normal);
+  for (const Eigen::Vector3f& edge : view.edges_mm.first(std::min(edges_max, view.edges_mm.size())))
+    model.add_edge(anchor + turn * edge, Eigen::Vector2f::Zero());
   return model;
 }
 

@@ -20,8 +20,8 @@ class ModelPoints {
   std::vector<float> surfels, edges;  ///< Groups of 6 × 8 and 5 × 8 values.
   std::size_t surfel_count = 0, edge_count = 0;
 };
-/// Of a view's samples at a pose near the view's own rotation.
-ModelPoints model_points(const View& view, const Pose& pose);
+/// Of a view's samples at a pose near the view's own rotation: its first ones.
+ModelPoints model_points(const View& view, const Pose& pose, std::size_t surface_max, std::size_t edges_max);
 /// Of a rendered template: up to about `surface_max` pixels and `edges_max` edge pixels, evenly thinned.
 ModelPoints model_points(const Scene& scene, const Rasteriser& part, const Pose& pose, const Template& drawn,
                          std::size_t surface_max, std::size_t edges_max,
