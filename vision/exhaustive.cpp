@@ -11,11 +11,11 @@
 namespace binpick::vision {
 namespace {
 /// Tested after the first sixteen, before all of them and the edges.
-constexpr std::size_t kMoreSamples = 64;
+constexpr std::size_t kMoreSamples = 32;
 constexpr int kExplainedMin = 4;
 constexpr int kContradictedMax = 8;
 /// So many pass the first test in all; shared evenly, lest a wide plateau takes the time of all others.
-constexpr double kPassedMax = 100'000, kPassedMin = 400;
+constexpr double kPassedMax = 60'000, kPassedMin = 300;
 constexpr std::size_t kBlockRows = 2048;
 
 /// The picture with a frame as wide as the part, so that no sample needs to be asked whether it is inside.

@@ -13,7 +13,7 @@ namespace binpick::vision {
 struct ExhaustiveOptions {
   float tolerance_mm = 5;        ///< Of the samples; as wide as the grid of rotations is coarse.
   float z_floor_mm = 0;          ///< No part of the object lies lower.
-  std::size_t per_maximum = 64;  ///< Bound of the views kept for one maximum, each the best of its surroundings.
+  std::size_t per_maximum = 24;  ///< Bound of the views kept for one maximum, each the best of its surroundings.
   double apart_rad = 0.14;       ///< Views nearer to a better one of the same maximum are dropped.
   double effort = 1;             ///< Multiplies the bounds.
   bool all_anchors = true;       ///< Else each view's first only.

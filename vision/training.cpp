@@ -27,11 +27,12 @@ constexpr int kLooks = 4;
 constexpr std::size_t kVotesPerView = 256;
 
 double default_pixel_mm(const Mesh& mesh, const ScannerFigures& figures, double diameter_mm) {
-  const double spacing = std::max(figures.spacing_along_mm, figures.spacing_across_mm);
+  // Of as many points, spread evenly.
+  const double spacing = std::sqrt(figures.spacing_along_mm * figures.spacing_across_mm);
   // A quarter of the part's thinnest direction, by its surface's deviation (a plate's is half its thickness).
   const Eigen::Vector3d variance = surface_covariance(mesh).selfadjointView<Eigen::Lower>().eigenvalues();
   const double thin = 0.5 * std::sqrt(std::max(0.0, variance.minCoeff()));
-  const double pixel = std::min(0.5 * spacing, std::max(thin, 0.25 * spacing));
+  const double pixel = std::min(0.8 * spacing, std::max(thin, 0.25 * spacing));
   return std::max(pixel, diameter_mm / 120);  // A vote reaches 127 pixels.
 }
 
@@ -207,7 +208,7 @@ Expected<KnowledgeBase, MeshError> train(const Mesh& mesh, const PartOptions& op
     return failed("the part's diameter is " + mm(part.diameter_mm) + ", too small for pixels of " + mm(part.pixel_mm) +
                   "; check mesh_unit, pixel_mm and scanner");
   const int asked =
-      std::clamp(options.rotations.value_or(part.scanner == ScannerClass::Lms400 ? 10'000 : 20'000), 1, kRotationsMax);
+      std::clamp(options.rotations.value_or(10'000), 1, kRotationsMax);
   std::vector<Eigen::Quaterniond> rotations = training_rotations(asked, part.symmetry);
   part.rotation_gap_rad = gap_rad(asked, part.symmetry);
   std::size_t resting = 0;
