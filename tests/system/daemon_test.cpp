@@ -87,7 +87,12 @@ TEST(Daemon, ReloadsWhileCyclesRun) {
   EXPECT_TRUE(cell.run_until([&] { return cell.plc().alarms_seen().contains(plc::Alarm::ConfigurationRefused); }, 2s));
   EXPECT_NE(cell.daemon_log().find("system.toml"), std::string::npos);
   // A good one: in force at the next cycle, and the alarm's cause is gone.
-  ASSERT_TRUE(cell.run_until([&] { return cell.plc().ready() && cell.robot().clear_of_view(); }));
+  // The robot has its own time: that it is clear of the view says little before it has fetched its pick.
+  const auto robot_did = [&](std::size_t picks) {
+    return cell.run_until(
+        [&] { return cell.plc().ready() && cell.robot().picks_done() == picks && cell.robot().clear_of_view(); });
+  };
+  ASSERT_TRUE(robot_did(1));
   cell.plc().raise_request(1, 1);
   ASSERT_TRUE(cell.run_until([&] { return cell.plc().busy(); }));
   CellFile edited = cell.file();
@@ -97,7 +102,7 @@ TEST(Daemon, ReloadsWhileCyclesRun) {
   ASSERT_TRUE(cell.run_until([&] { return (result = cell.plc().take_result()).has_value(); }));
   EXPECT_EQ(result->code, plc::ResultCode::PickFound);
   ASSERT_TRUE(cell.run_until([&] { return cell.daemon_log().find("is in force") != std::string::npos; }, 5s));
-  ASSERT_TRUE(cell.run_until([&] { return cell.plc().ready() && cell.robot().clear_of_view(); }));
+  ASSERT_TRUE(robot_did(2));
   result = cell.pick();
   ASSERT_TRUE(result.has_value());
   EXPECT_EQ(result->code, plc::ResultCode::NotReachable);
