@@ -30,6 +30,10 @@ constexpr std::size_t kQuickSurface = 48, kQuickEdges = 24, kAll = 1000;
 constexpr std::size_t kOfEachMaximum = 6;
 /// So many poses of one place are enough: a well-seen object must not crowd out the others.
 constexpr std::size_t kCrowdMax = 10, kRenderedCrowdMax = 3;
+constexpr double kCrowdDiameters = 0.15;
+/// A place is settled by a pose this sure; what explains less than this share of what it does is not looked at again.
+constexpr double kSettledScore = 0.9;
+constexpr float kSettledShare = 0.85F;
 constexpr double kSparseToleranceDiameters = 0.035;
 /// A rotation of a grid of 10 000 is up to nine degrees off, which moves the lowest point against the highest by so
 /// much: a narrower gate silently loses what lies flat on the floor.
@@ -108,12 +112,11 @@ class Detecting {
     ended("maxima");
     observed({"maxima", maxima, {}});
     std::vector<Candidate> candidates;
-    Grid<std::uint8_t> explained;
     if (with("second pass")) {
       pass(far_apart(maxima), candidates);
-      select(scene_, finish_.rasteriser(), part_.symmetry, candidates, select_options(), kValidScore, &explained);
+      const std::vector<Eigen::Vector3f> left = unexplained(maxima, explained_by(candidates));
       ended("selection");
-      pass(unexplained(maxima, explained), candidates);
+      pass(left, candidates);
     } else {
       pass(maxima, candidates);
     }
@@ -375,7 +378,7 @@ class Detecting {
 
   std::vector<Hypothesis> distinct(std::vector<Hypothesis> hypotheses, std::size_t most, std::size_t crowd) const {
     std::stable_sort(hypotheses.begin(), hypotheses.end(), stronger);
-    const double same_mm = 0.04 * part_.diameter_mm, crowd_mm = 0.15 * part_.diameter_mm;
+    const double same_mm = 0.04 * part_.diameter_mm, crowd_mm = kCrowdDiameters * part_.diameter_mm;
     std::vector<Hypothesis> kept;
     std::vector<Eigen::Vector3f> centres;
     for (const Hypothesis& h : hypotheses) {
@@ -396,22 +399,71 @@ class Detecting {
     return kept;
   }
 
+  /// The best of each place first; the others of a place only where that did not settle it.
   void render(const std::vector<Hypothesis>& hypotheses, std::vector<Candidate>& candidates) {
+    const auto place_mm = static_cast<float>(kCrowdDiameters * part_.diameter_mm);
+    std::vector<std::size_t> leaders, others, leader_of(hypotheses.size());
+    std::vector<Eigen::Vector3f> centres;
+    for (std::size_t i = 0; i < hypotheses.size(); ++i) {
+      centres.push_back(hypotheses[i].pose.R * centroid_ + hypotheses[i].pose.t);
+      const auto leader = std::find_if(leaders.begin(), leaders.end(),
+                                       [&](std::size_t l) { return (centres[l] - centres[i]).norm() < place_mm; });
+      leader_of[i] = leader == leaders.end() ? i : *leader;
+      (leader == leaders.end() ? leaders : others).push_back(i);
+    }
     std::vector<Candidate> made(hypotheses.size());
-    std::vector<Template> drawn(static_cast<std::size_t>(std::clamp(options_.threads, 1, 64)));
-    std::mutex first_valid;
-    const std::size_t before = rendered_;
-    rendered_ += hypotheses.size();
-    share(options_.threads, hypotheses.size(), deadline_, [&](std::size_t i, int thread) {
-      made[i] = finish_.finished(hypotheses[i].pose, drawn[static_cast<std::size_t>(thread)]);
-      if (score_of(made[i].evidence) < kValidScore || !outside(made[i].pose).empty()) return;
-      const std::scoped_lock lock{first_valid};
-      if (!report_.first) report_.first = FirstValid{{made[i].pose.iso()}, milliseconds_since(start_), before + i + 1};
+    finish(hypotheses, leaders, made);
+    std::erase_if(others, [&](std::size_t i) {
+      const Candidate& leader = made[leader_of[i]];
+      return score_of(leader.evidence) > kSettledScore && hypotheses[i].evidence < kSettledShare * leader.test.evidence;
     });
+    finish(hypotheses, others, made);
     for (Candidate& c : made)
       if (c.test.evidence > 0) candidates.push_back(std::move(c));
     std::stable_sort(candidates.begin(), candidates.end(),
                      [](const Candidate& a, const Candidate& b) { return a.test.evidence > b.test.evidence; });
+  }
+
+  void finish(const std::vector<Hypothesis>& hypotheses, const std::vector<std::size_t>& which,
+              std::vector<Candidate>& made) {
+    std::vector<Template> drawn(static_cast<std::size_t>(std::clamp(options_.threads, 1, 64)));
+    std::mutex first_valid;
+    share(options_.threads, which.size(), deadline_, [&](std::size_t k, int thread) {
+      Candidate& candidate = made[which[k]];
+      candidate = finish_.finished(hypotheses[which[k]].pose, drawn[static_cast<std::size_t>(thread)]);
+      if (score_of(candidate.evidence) < kValidScore || !outside(candidate.pose).empty()) return;
+      const std::scoped_lock lock{first_valid};
+      if (!report_.first)
+        report_.first = FirstValid{{candidate.pose.iso()}, milliseconds_since(start_), rendered_ + k + 1};
+    });
+    rendered_ += which.size();
+  }
+
+  /// Pixels that a valid pose explains. Of poses that are close together the strongest only is looked at.
+  Grid<std::uint8_t> explained_by(const std::vector<Candidate>& candidates) const {
+    const auto place_mm = static_cast<float>(kCrowdDiameters * part_.diameter_mm);
+    std::vector<const Candidate*> standing;
+    std::vector<Eigen::Vector3f> centres;
+    for (const Candidate& c : candidates) {
+      if (score_of(c.evidence) < kValidScore || !outside(c.pose).empty()) continue;
+      const Eigen::Vector3f centre = c.pose.R * centroid_ + c.pose.t;
+      if (std::any_of(centres.begin(), centres.end(),
+                      [&](const Eigen::Vector3f& other) { return (other - centre).norm() < place_mm; }))
+        continue;
+      standing.push_back(&c);
+      centres.push_back(centre);
+    }
+    Grid<std::uint8_t> explained = Grid<std::uint8_t>::Zero(scene_.rows(), scene_.cols());
+    Template drawn;
+    std::vector<PixelState> states;
+    for (const Candidate* c : standing) {
+      finish_.rasteriser().draw(c->pose.R, c->pose.t, scene_.pixel_mm, scene_.origin_mm, drawn, false);
+      compare(scene_, finish_.rasteriser(), c->pose, drawn, states);
+      for (int row = 0; row < drawn.rows; ++row)
+        for (int col = 0; col < drawn.cols; ++col)
+          if (states[drawn.at(row, col)] == PixelState::Explained) explained(row + drawn.row0, col + drawn.col0) = 1;
+    }
+    return explained;
   }
 
   SelectOptions select_options() const {

@@ -60,8 +60,7 @@ double displacement_mm(const Candidate& a, const Candidate& b, const Symmetry& s
 }
 
 std::vector<Selected> select(const Scene& scene, const Rasteriser& part, const Symmetry& symmetry,
-                             std::vector<Candidate> candidates, const SelectOptions& options, double sure,
-                             Grid<std::uint8_t>* explained_by_sure) {
+                             std::vector<Candidate> candidates, const SelectOptions& options) {
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const Candidate& a, const Candidate& b) { return a.test.evidence > b.test.evidence; });
   struct Standing {
@@ -128,10 +127,6 @@ std::vector<Selected> select(const Scene& scene, const Rasteriser& part, const S
     all.push_back(std::move(entry));
   }
   for (Selected& entry : all) entry.score = score_of(entry.candidate.evidence);
-  if (explained_by_sure != nullptr)
-    *explained_by_sure = owner.unaryExpr([&](std::int32_t s) {
-      return static_cast<std::uint8_t>(s >= 0 && all[standing[static_cast<std::size_t>(s)].selected].score >= sure);
-    });
   std::stable_sort(all.begin(), all.end(), [](const Selected& a, const Selected& b) { return a.score > b.score; });
   return all;
 }

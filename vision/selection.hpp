@@ -36,11 +36,9 @@ struct Selected {
 
 /// Goes through the candidates by evidence: the first stands; what shows the same object again is dropped, what lives
 /// on pixels that a better one explains already, or stands inside of it, is rejected with that reason, and so is what
-/// is not believed by itself. Best first. `explained` becomes 1 where a detection of at least `sure` explains the
-/// picture, else 0.
+/// is not believed by itself. Best first.
 std::vector<Selected> select(const Scene& scene, const Rasteriser& part, const Symmetry& symmetry,
-                             std::vector<Candidate> candidates, const SelectOptions& options, double sure = 1,
-                             Grid<std::uint8_t>* explained = nullptr);
+                             std::vector<Candidate> candidates, const SelectOptions& options);
 
 /// Surface displacement (rms, mm) that the distance of two poses stands for.
 double displacement_mm(const Candidate& a, const Candidate& b, const Symmetry& symmetry, double radius_mm);
