@@ -14,7 +14,6 @@ namespace {
 constexpr float kTurnedShare = 0.5F;
 /// nor are more than so many of one candidate.
 constexpr std::size_t kTurnedRefined = 3;
-constexpr float kTrace = 0.001F;
 /// What was not measured speaks a little against a part there: it decides between poses that explain as much.
 constexpr float kMissingWeight = 0.15F;
 }  // namespace
@@ -45,8 +44,7 @@ std::vector<float> Finisher::looked_at(const std::vector<Pose>& poses) const {
   std::vector<Template> drawn = canvases();
   std::vector<float> evidence(poses.size(), 0);
   share(options_.threads, poses.size(), deadline_, [&](std::size_t i, int thread) {
-    evidence[i] =
-        std::max(glance(scene_, rasteriser_, poses[i], drawn[static_cast<std::size_t>(thread)], every), kTrace);
+    evidence[i] = glance(scene_, rasteriser_, poses[i], drawn[static_cast<std::size_t>(thread)], every);
   });
   return evidence;
 }

@@ -20,7 +20,7 @@ class Finisher {
   /// All of it is used until the finisher goes.
   Finisher(const Scene& scene, const KnowledgeBase::Impl& part, const Deadline& deadline, const FinishOptions& options);
 
-  /// Evidence of the poses as they are, by a coarse render, at least a trace: cheaper than refinement by far.
+  /// Evidence of the poses as they are by a coarse render: cheaper than refinement by far.
   std::vector<float> looked_at(const std::vector<Pose>& poses) const;
   /// Refined against its own render, twice; then the rendered test.
   Candidate finished(Pose pose, Template& drawn) const;

@@ -31,6 +31,8 @@ constexpr std::size_t kOfEachMaximum = 6;
 /// So many poses of one place are enough: a well-seen object must not crowd out the others.
 constexpr std::size_t kCrowdMax = 10, kRenderedCrowdMax = 3;
 constexpr double kCrowdDiameters = 0.15;
+/// What explains less of its silhouette at the first look is not refined: strict where there is a second pass.
+constexpr float kFirstLookShare = 0.05F, kLastLookShare = -0.2F;
 /// A place is settled by a pose this sure; what explains less than this share of what it does is not looked at again.
 constexpr double kSettledScore = 0.9;
 constexpr float kSettledShare = 0.85F;
@@ -113,12 +115,12 @@ class Detecting {
     observed({"maxima", maxima, {}});
     std::vector<Candidate> candidates;
     if (with("second pass")) {
-      pass(far_apart(maxima), candidates);
+      pass(far_apart(maxima), kFirstLookShare, candidates);
       const std::vector<Eigen::Vector3f> left = unexplained(maxima, explained_by(candidates));
       ended("selection");
-      pass(left, candidates);
+      pass(left, kLastLookShare, candidates);
     } else {
-      pass(maxima, candidates);
+      pass(maxima, kLastLookShare, candidates);
     }
     for (const auto& [stage, poses] : alive_) observed({stage, {}, poses});
     if (with("turned")) finish_.add_turned(candidates, most(kTurnedBest), kSameDiameters * part_.diameter_mm);
@@ -137,7 +139,7 @@ class Detecting {
   std::size_t most(double cap) const { return static_cast<std::size_t>(std::max(1.0, cap * options_.effort)); }
 
   /// From maxima to candidates, which are added and sorted by evidence.
-  void pass(const std::vector<Eigen::Vector3f>& maxima, std::vector<Candidate>& candidates) {
+  void pass(const std::vector<Eigen::Vector3f>& maxima, float look_share, std::vector<Candidate>& candidates) {
     std::vector<Hypothesis> hypotheses;
     if (options_.search == Search::Votes) {
       const std::vector<Ballot> ballots = ballots_of(maxima);
@@ -155,12 +157,7 @@ class Detecting {
     hypotheses = distinct(std::move(hypotheses), most(kDistinctBest), kCrowdMax);
     ended("first refinement");
     remember("first refinement", hypotheses, [](const Hypothesis& h) { return h.pose.iso(); });
-    if (with("first look")) {
-      std::vector<Pose> poses;
-      for (const Hypothesis& h : hypotheses) poses.push_back(h.pose);
-      const std::vector<float> evidence = finish_.looked_at(poses);
-      for (std::size_t i = 0; i < hypotheses.size(); ++i) hypotheses[i].evidence = evidence[i];
-    }
+    if (with("first look")) look_at(hypotheses, look_share);
     hypotheses = distinct(std::move(hypotheses), most(kRenderedBest), kRenderedCrowdMax);
     ended("first look");
     remember("first look", hypotheses, [](const Hypothesis& h) { return h.pose.iso(); });
@@ -397,6 +394,24 @@ class Detecting {
       centres.push_back(centre);
     }
     return kept;
+  }
+
+  /// Drops what explains less of its silhouette than `share` (below zero: what is contradicted by more).
+  void look_at(std::vector<Hypothesis>& hypotheses, float share) const {
+    constexpr float kTrace = 0.001F;
+    std::vector<Pose> poses;
+    for (const Hypothesis& h : hypotheses) poses.push_back(h.pose);
+    const std::vector<float> seen = finish_.looked_at(poses);
+    std::vector<Hypothesis> kept;
+    for (std::size_t i = 0; i < hypotheses.size(); ++i) {
+      Hypothesis& h = hypotheses[i];
+      if (seen[i] < share * part_.views[h.view].area_mm2 / static_cast<float>(scene_.pixel_mm * scene_.pixel_mm))
+        continue;
+      // Refinement may mend what is more contradicted than explained: it comes last, but in its order.
+      h.evidence = seen[i] > kTrace ? seen[i] : kTrace / (1 + kTrace - seen[i]);
+      kept.push_back(h);
+    }
+    hypotheses = std::move(kept);
   }
 
   /// The best of each place first; the others of a place only where that did not settle it.
