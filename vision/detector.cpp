@@ -25,7 +25,7 @@ constexpr double kSparseBest = 2000, kNudgedBest = 600, kDistinctBest = 300, kRe
 /// Two of them are one if their centres and rotations are no further apart than this.
 constexpr double kThinDiameters = 0.06, kThinGaps = 2.0;
 /// Samples of the first steps of refinement.
-constexpr std::size_t kQuickSurface = 48, kQuickEdges = 24, kAll = 1000;
+constexpr std::size_t kQuickSurface = 64, kQuickEdges = 24, kAll = 1000;
 /// So many of each maximum stay, whatever those of others are worth.
 constexpr std::size_t kOfEachMaximum = 6;
 /// So many poses of one place are enough: a well-seen object must not crowd out the others.
@@ -281,17 +281,18 @@ class Detecting {
   }
 
   std::vector<Hypothesis> tested_all(const std::vector<Eigen::Vector3f>& maxima) {
-    ExhaustiveOptions search;
-    search.tolerance_mm = coarse_tolerance_mm();
-    search.z_floor_mm = lowest_allowed_mm_;
-    search.threads = options_.threads;
-    search.effort = options_.effort;
-    search.all_anchors = with("all anchors");
+    if (!search_) {
+      ExhaustiveOptions search;
+      search.tolerance_mm = coarse_tolerance_mm();
+      search.z_floor_mm = lowest_allowed_mm_;
+      search.threads = options_.threads;
+      search.effort = options_.effort;
+      search.all_anchors = with("all anchors");
+      search_.emplace(scene_, part_, search);
+    }
     std::vector<Hypothesis> hypotheses;
-    std::size_t passed = 0;
-    for (const Standing& s : search_all(scene_, part_, maxima, search, deadline_, passed))
+    for (const Standing& s : search_->at(maxima, deadline_, report_.hypotheses))
       hypotheses.push_back({s.maximum, s.view, pose_at(maxima[s.maximum], part_.views[s.view], s.anchor), s.evidence});
-    report_.hypotheses += passed;
     keep_best(hypotheses);
     return hypotheses;
   }
@@ -355,7 +356,7 @@ class Detecting {
         Hypothesis& h = hypotheses[i];
         refine(scene_, model_points(part_.views[h.view], h.pose, surface_max, edges_max),
                h.pose.R * centroid_ + h.pose.t, options, h.pose);
-        h.evidence = sparse_evidence(scene_, part_, h.view, h.pose, evidence_mm);
+        h.evidence = sparse_evidence(scene_, part_, h.view, h.pose, evidence_mm, surface_max);
       });
     };
     options.steps = 2;
@@ -548,6 +549,7 @@ class Detecting {
   double noise_mm_ = 1;
   float floor_mm_ = 0, lowest_allowed_mm_ = 0;
   std::size_t rendered_ = 0;
+  std::optional<ExhaustiveSearch> search_;
   std::vector<std::pair<std::string_view, std::vector<Transform<frame::Supply, frame::Object>>>> alive_;
   DetectionReport report_;
 };

@@ -28,9 +28,32 @@ struct Standing {
   float evidence = 0;        ///< As sparse_evidence().
 };
 
-/// In the order of the maxima, each maximum's best first. `tested` becomes the number of views that got past the first
-/// sixteen samples. The result does not depend on the number of threads.
-std::vector<Standing> search_all(const Scene& scene, const KnowledgeBase::Impl& part,
-                                 const std::vector<Eigen::Vector3f>& maxima, const ExhaustiveOptions& options,
-                                 const Deadline& deadline, std::size_t& tested);
+/// The search in one picture; what does not depend on the maxima is made once. Uses scene and part until it goes.
+class ExhaustiveSearch {
+ public:
+  ExhaustiveSearch(const Scene& scene, const KnowledgeBase::Impl& part, const ExhaustiveOptions& options);
+  /// In the order of the maxima, each maximum's best first. `tested` grows by the number of views that got past the
+  /// first sixteen samples. The result does not depend on the number of threads.
+  std::vector<Standing> at(const std::vector<Eigen::Vector3f>& maxima, const Deadline& deadline,
+                           std::size_t& tested) const;
+
+ private:
+  /// Where a maximum lies in the picture, and what may stand there.
+  struct Place {
+    const float* at = nullptr;  ///< In the padded picture; nothing: outside.
+    std::size_t rows = 0;       ///< Those that do not reach through the floor.
+  };
+  Place place_of(const Eigen::Vector3f& maximum) const;
+  std::vector<Standing> standing_at(const Eigen::Vector3f& maximum, std::uint32_t index,
+                                    std::vector<std::uint32_t> passed) const;
+  void thin_out(std::vector<Standing>& found) const;
+
+  const Scene& scene_;
+  const KnowledgeBase::Impl& part_;
+  ExhaustiveOptions options_;
+  /// The picture with a frame as wide as the part, so that no sample needs to be asked whether it is inside.
+  int margin_px_, padded_cols_;
+  std::vector<float> padded_mm_;
+  std::vector<std::int32_t> offsets_;  ///< Of the samples of all rows, from their anchor, in the padded picture.
+};
 }  // namespace binpick::vision

@@ -37,11 +37,12 @@ kernels::Drawn drawn_of(const Scene& scene, const Rasteriser& part, const Pose& 
 }
 
 float sparse(const Scene& scene, const KnowledgeBase::Impl& part, std::size_t view, float tolerance_mm,
-             const kernels::Motion& motion) {
+             const kernels::Motion& motion, std::size_t samples_max = 1000) {
   constexpr std::size_t kFirst = 16;
   constexpr float kHopeless = -1;
   const std::span<const float> points = prepared(part).surface(view), edges = prepared(part).edges(view);
-  const std::size_t n = points.size() / 3, first = std::min(n, kFirst);
+  const bool all = samples_max >= points.size() / 3;
+  const std::size_t n = all ? points.size() / 3 : samples_max, first = std::min(n, kFirst);
   if (n == 0) return kHopeless;
   const kernels::Picture picture = picture_of(scene, false);
   kernels::SparseSum sum;
@@ -51,7 +52,7 @@ float sparse(const Scene& scene, const KnowledgeBase::Impl& part, std::size_t vi
     kernels::table().sparse(picture, motion, points.data() + 3 * first, n - first, tolerance_mm, sum);
   }
   if (sum.evidence <= 0) return kHopeless;
-  const std::size_t m = edges.size() / 3;
+  const std::size_t m = all ? edges.size() / 3 : 0;
   const float found = m == 0 ? 0 : kernels::table().edges(picture, motion, edges.data(), m) / static_cast<float>(m);
   const float pixels = part.views[view].area_mm2 / static_cast<float>(scene.pixel_mm * scene.pixel_mm);
   return pixels * (sum.evidence / static_cast<float>(n) + 0.3F * found);
@@ -104,10 +105,11 @@ float sparse_evidence(const Scene& scene, const KnowledgeBase::Impl& part, std::
 }
 
 float sparse_evidence(const Scene& scene, const KnowledgeBase::Impl& part, std::size_t view, const Pose& pose,
-                      float tolerance_mm) {
+                      float tolerance_mm, std::size_t samples_max) {
   const View& seen = part.views[view];
   const Eigen::Matrix3f turn = pose.R * seen.R_supply_object.toRotationMatrix().transpose();
-  return sparse(scene, part, view, tolerance_mm, motion_of(turn, pose.R * seen.anchors_object_mm.front() + pose.t));
+  return sparse(scene, part, view, tolerance_mm, motion_of(turn, pose.R * seen.anchors_object_mm.front() + pose.t),
+                samples_max);
 }
 
 float DenseTest::visible_fraction() const {

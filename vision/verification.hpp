@@ -28,9 +28,10 @@ kernels::Motion motion_of(const Eigen::Matrix3f& turn, const Eigen::Vector3f& sh
 /// whole silhouette. `p_supply` is the place of the view's first anchor.
 float sparse_evidence(const Scene& scene, const KnowledgeBase::Impl& part, std::size_t view,
                       const Eigen::Vector3f& p_supply, float tolerance_mm);
-/// The same for a pose that has left the view's own rotation.
+/// The same for a pose that has left the view's own rotation. With fewer samples (a multiple of eight) than the view
+/// has, its edges are left out.
 float sparse_evidence(const Scene& scene, const KnowledgeBase::Impl& part, std::size_t view, const Pose& pose,
-                      float tolerance_mm);
+                      float tolerance_mm, std::size_t samples_max = 1000);
 
 /// A pose, rendered and compared pixel by pixel with the measured surface.
 struct DenseTest {
