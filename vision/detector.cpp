@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 #include <mutex>
+#include <unordered_map>
 #include <utility>
 
 #include "base/check.hpp"
@@ -237,6 +238,7 @@ class Detecting {
   std::vector<Eigen::Vector3f> anchors() const {
     MaximaOptions maxima;
     maxima.diameter_mm = part_.diameter_mm;
+    maxima.threads = options_.threads;
     // The flattest view's top is the lowest place of any anchor.
     float rise = std::numeric_limits<float>::max();
     for (const View& view : part_.views) rise = std::min(rise, -view.lowest_mm);
@@ -320,7 +322,16 @@ class Detecting {
     std::stable_sort(hypotheses.begin(), hypotheses.end(), stronger);
     const auto cell_mm = static_cast<float>(kThinDiameters * part_.diameter_mm);
     const auto same_turn = static_cast<float>(std::cos(0.5 * kThinGaps * part_.rotation_gap_rad));
-    std::map<std::array<int, 3>, std::vector<std::pair<Eigen::Vector3f, Eigen::Quaternionf>>> cells;
+    struct Kept {
+      Eigen::Vector3f centre;
+      Eigen::Quaternionf turn;
+    };
+    std::unordered_map<std::uint64_t, std::vector<Kept>> cells;
+    const auto key_of = [](const Eigen::Array3i& cell) {
+      constexpr std::uint64_t kBits = 21, kMask = (1U << kBits) - 1;
+      const Eigen::Array<std::uint64_t, 3, 1> bits = (cell + (1 << (kBits - 1))).cast<std::uint64_t>();
+      return (bits.x() & kMask) << (2 * kBits) | (bits.y() & kMask) << kBits | (bits.z() & kMask);
+    };
     std::vector<Hypothesis> kept;
     for (Hypothesis& h : hypotheses) {
       const Eigen::Vector3f centre = h.pose.R * centroid_ + h.pose.t;
@@ -328,14 +339,14 @@ class Detecting {
       const Eigen::Array3i cell = (centre / cell_mm).array().floor().cast<int>();
       bool again = false;
       for (int k = 0; k < 27 && !again; ++k) {
-        const auto it = cells.find({cell.x() + k % 3 - 1, cell.y() + k / 3 % 3 - 1, cell.z() + k / 9 - 1});
+        const auto it = cells.find(key_of(cell + Eigen::Array3i(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1)));
         if (it == cells.end()) continue;
-        again = std::any_of(it->second.begin(), it->second.end(), [&](const auto& other) {
-          return (other.first - centre).norm() < cell_mm && std::abs(other.second.dot(turn)) > same_turn;
+        again = std::any_of(it->second.begin(), it->second.end(), [&](const Kept& other) {
+          return std::abs(other.turn.dot(turn)) > same_turn && (other.centre - centre).norm() < cell_mm;
         });
       }
       if (again) continue;
-      cells[{cell.x(), cell.y(), cell.z()}].emplace_back(centre, turn);
+      cells[key_of(cell)].push_back({centre, turn});
       kept.push_back(std::move(h));
     }
     return kept;
@@ -487,6 +498,8 @@ class Detecting {
     options.same_mm = kSameDiameters * part_.diameter_mm;
     options.diameter_mm = part_.diameter_mm;
     options.radius_mm = finish_.radius_mm();
+    options.centroid_mm = centroid_;
+    options.threads = options_.threads;
     options.score_min = kScoreMin;
     options.outside = [this](const Pose& pose) { return outside(pose); };
     options.rooms = with("rooms");

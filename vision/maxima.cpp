@@ -4,6 +4,8 @@
 #include <cmath>
 #include <map>
 
+#include "vision/team.hpp"
+
 namespace binpick::vision {
 namespace {
 constexpr double kWindowDiameters = 0.06;
@@ -73,12 +75,16 @@ void add_anchors(const Scene& scene, const std::vector<Peak>& plateau, double ce
 std::vector<Eigen::Vector3f> find_maxima(const Scene& scene, const MaximaOptions& options) {
   const int radius =
       std::max(2, static_cast<int>(std::lround(kWindowDiameters * options.diameter_mm / scene.pixel_mm)));
-  std::vector<Peak> peaks;
-  for (int r = 0; r < scene.rows(); ++r)
+  std::vector<std::vector<Peak>> of_row(static_cast<std::size_t>(scene.rows()));
+  share(options.threads, of_row.size(), Deadline{}, [&](std::size_t row, int) {
+    const int r = static_cast<int>(row);
     for (int c = 0; c < scene.cols(); ++c) {
       const float z = scene.z_mm(r, c);
-      if (z >= options.z_min_mm && is_local_maximum(scene, r, c, radius)) peaks.push_back({r, c, z});
+      if (z >= options.z_min_mm && is_local_maximum(scene, r, c, radius)) of_row[row].push_back({r, c, z});
     }
+  });
+  std::vector<Peak> peaks;
+  for (const auto& row : of_row) peaks.insert(peaks.end(), row.begin(), row.end());
   std::stable_sort(peaks.begin(), peaks.end(), [](const Peak& a, const Peak& b) { return a.z > b.z; });
 
   const auto depth = static_cast<float>(std::max(2 * scene.noise_mm, kPlateauDiameters * options.diameter_mm));

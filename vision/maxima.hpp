@@ -9,6 +9,7 @@ namespace binpick::vision {
 struct MaximaOptions {
   double diameter_mm = 100;  ///< Of the part.
   float z_min_mm = 0;        ///< No anchor below: nothing of the part can be so low.
+  int threads = 2;           ///< The result does not depend on it.
 };
 
 /// Where a part's highest point may be, supply frame, the highest plateau first, of each its middle first: local maxima

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "vision/team.hpp"
+
 namespace binpick::vision {
 namespace {
 constexpr double kClaimedMax = 0.5;
@@ -51,6 +53,133 @@ double shared_room(const Template& a, const Template& b, float depth_mm) {
   return static_cast<double>(shared) /
          static_cast<double>(std::max<std::ptrdiff_t>(1, std::min(columns(a), columns(b))));
 }
+/// A candidate on the picture.
+struct Shown {
+  Template drawn;
+  std::vector<PixelState> states;  ///< Empty: not drawn yet.
+};
+
+class Selecting {
+ public:
+  Selecting(const Scene& scene, const Rasteriser& part, const Symmetry& symmetry, std::vector<Candidate> candidates,
+            const SelectOptions& options)
+      : scene_{scene},
+        part_{part},
+        symmetry_{symmetry},
+        options_{options},
+        candidates_{std::move(candidates)},
+        owner_{Grid<std::int32_t>::Constant(scene.rows(), scene.cols(), -1)} {
+    std::stable_sort(candidates_.begin(), candidates_.end(),
+                     [](const Candidate& a, const Candidate& b) { return a.test.evidence > b.test.evidence; });
+    for (const Candidate& c : candidates_) {
+      centres_.push_back(c.pose.R * options.centroid_mm + c.pose.t);
+      std::string reason = options.outside ? options.outside(c.pose) : "";
+      if (reason.empty() && score_of(c.evidence) < options.score_min) reason = what_speaks_against(c.test);
+      own_reasons_.push_back(std::move(reason));
+    }
+    shown_.resize(candidates_.size());
+  }
+
+  std::vector<Selected> run() {
+    show_likely();
+    for (std::size_t i = 0; i < candidates_.size(); ++i) judge(i);
+    for (Selected& entry : all_) entry.score = score_of(entry.candidate.evidence);
+    std::stable_sort(all_.begin(), all_.end(), [](const Selected& a, const Selected& b) { return a.score > b.score; });
+    return std::move(all_);
+  }
+
+ private:
+  struct Standing {
+    std::size_t candidate, selected;
+  };
+
+  bool same(std::size_t a, std::size_t b) const {
+    return (centres_[a] - centres_[b]).norm() < static_cast<float>(options_.same_mm) &&
+           displacement_mm(candidates_[a], candidates_[b], symmetry_, options_.radius_mm) < options_.same_mm;
+  }
+
+  void show(std::size_t i) {
+    const Pose& pose = candidates_[i].pose;
+    part_.draw(pose.R, pose.t, scene_.pixel_mm, scene_.origin_mm, shown_[i].drawn, options_.rooms);
+    compare(scene_, part_, pose, shown_[i].drawn, shown_[i].states);
+  }
+
+  /// Those that will most likely be asked for, by all threads; the others are drawn when they are.
+  void show_likely() {
+    std::vector<std::size_t> likely;
+    for (std::size_t i = 0; i < candidates_.size(); ++i)
+      if (own_reasons_[i].empty() &&
+          std::none_of(likely.begin(), likely.end(), [&](std::size_t other) { return same(other, i); }))
+        likely.push_back(i);
+    share(options_.threads, likely.size(), Deadline{}, [&](std::size_t k, int) { show(likely[k]); });
+  }
+
+  template <class Work>
+  void for_explained(const Shown& shown, const Work& work) {
+    const Template& t = shown.drawn;
+    for (int r = 0; r < t.rows; ++r)
+      for (int c = 0; c < t.cols; ++c)
+        if (shown.states[t.at(r, c)] == PixelState::Explained) work(owner_(r + t.row0, c + t.col0));
+  }
+
+  void judge(std::size_t i) {
+    if (std::any_of(standing_.begin(), standing_.end(), [&](const Standing& s) { return same(s.candidate, i); }))
+      return;
+    Selected entry{candidates_[i], 0, own_reasons_[i], false};
+    if (entry.reason.empty()) {
+      if (shown_[i].states.empty()) show(i);
+      compare_with_standing(i, entry);
+      entry.overshadowed = !entry.reason.empty();
+      if (entry.reason.empty() && score_of(entry.candidate.evidence) < options_.score_min)
+        entry.reason = what_speaks_against(entry.candidate.test);
+    }
+    if (entry.reason.empty()) {
+      for_explained(shown_[i], [&](std::int32_t& owner) {
+        if (owner < 0) owner = static_cast<std::int32_t>(standing_.size());
+      });
+      standing_.push_back({i, all_.size()});
+    }
+    all_.push_back(std::move(entry));
+  }
+
+  /// What better ones take from it.
+  void compare_with_standing(std::size_t i, Selected& entry) {
+    std::vector<int> claims(standing_.size(), 0);
+    int explained = 0, claimed = 0;
+    for_explained(shown_[i], [&](const std::int32_t& owner) {
+      ++explained;
+      if (owner < 0) return;
+      ++claimed;
+      ++claims[static_cast<std::size_t>(owner)];
+    });
+    const auto room_mm = static_cast<float>(2 * tolerance_of(scene_) + 0.01 * options_.diameter_mm);
+    for (std::size_t s = 0; s < standing_.size(); ++s) {
+      const float share = static_cast<float>(claims[s]) / static_cast<float>(std::max(1, explained));
+      Candidate& better = all_[standing_[s].selected].candidate;
+      if (share > kRivalShare)
+        better.evidence[Clue::Rival] =
+            std::max(better.evidence[Clue::Rival], entry.candidate.test.evidence / better.test.evidence);
+      if (options_.rooms && entry.reason.empty() && share <= kClaimedMax &&
+          shared_room(shown_[standing_[s].candidate].drawn, shown_[i].drawn, room_mm) > kInsideMax)
+        entry.reason = "stands inside a better one";
+    }
+    Evidence& evidence = entry.candidate.evidence;
+    evidence[Clue::Claimed] = static_cast<float>(claimed) / static_cast<float>(std::max(1, explained));
+    if (options_.explain_away && evidence[Clue::Claimed] > kClaimedMax) entry.reason = "explained by a better one";
+  }
+
+  const Scene& scene_;
+  const Rasteriser& part_;
+  const Symmetry& symmetry_;
+  const SelectOptions& options_;
+  std::vector<Candidate> candidates_;  // strongest first
+  std::vector<Eigen::Vector3f> centres_;
+  std::vector<std::string> own_reasons_;
+  std::vector<Shown> shown_;
+  std::vector<Standing> standing_;
+  std::vector<Selected> all_;
+  Grid<std::int32_t> owner_;  // of each pixel: who of those standing explains it first
+};
 }  // namespace
 
 double displacement_mm(const Candidate& a, const Candidate& b, const Symmetry& symmetry, double radius_mm) {
@@ -61,73 +190,6 @@ double displacement_mm(const Candidate& a, const Candidate& b, const Symmetry& s
 
 std::vector<Selected> select(const Scene& scene, const Rasteriser& part, const Symmetry& symmetry,
                              std::vector<Candidate> candidates, const SelectOptions& options) {
-  std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const Candidate& a, const Candidate& b) { return a.test.evidence > b.test.evidence; });
-  struct Standing {
-    std::size_t selected;
-    Template drawn;
-  };
-  std::vector<Standing> standing;
-  std::vector<Selected> all;
-  std::vector<PixelState> states;
-  Grid<std::int32_t> owner = Grid<std::int32_t>::Constant(scene.rows(), scene.cols(), -1);
-  const auto room_mm = static_cast<float>(2 * tolerance_of(scene) + 0.01 * options.diameter_mm);
-
-  for (Candidate& candidate : candidates) {
-    const bool again = std::any_of(standing.begin(), standing.end(), [&](const Standing& s) {
-      return displacement_mm(all[s.selected].candidate, candidate, symmetry, options.radius_mm) < options.same_mm;
-    });
-    if (again) continue;
-    Selected entry{candidate, 0, options.outside ? options.outside(candidate.pose) : "", false};
-    if (entry.reason.empty() && score_of(candidate.evidence) < options.score_min)
-      entry.reason = what_speaks_against(candidate.test);
-    if (!entry.reason.empty()) {
-      all.push_back(std::move(entry));
-      continue;
-    }
-    Template drawn;
-    part.draw(candidate.pose.R, candidate.pose.t, scene.pixel_mm, scene.origin_mm, drawn);
-    compare(scene, part, candidate.pose, drawn, states);
-    std::vector<int> claims(standing.size(), 0);
-    int explained = 0, claimed = 0;
-    for (int r = 0; r < drawn.rows; ++r)
-      for (int c = 0; c < drawn.cols; ++c) {
-        if (states[drawn.at(r, c)] != PixelState::Explained) continue;
-        ++explained;
-        const std::int32_t other = owner(r + drawn.row0, c + drawn.col0);
-        if (other < 0) continue;
-        ++claimed;
-        ++claims[static_cast<std::size_t>(other)];
-      }
-    for (std::size_t s = 0; s < standing.size(); ++s) {
-      const float share = static_cast<float>(claims[s]) / static_cast<float>(std::max(1, explained));
-      Candidate& better = all[standing[s].selected].candidate;
-      if (share > kRivalShare)
-        better.evidence[Clue::Rival] =
-            std::max(better.evidence[Clue::Rival], candidate.test.evidence / better.test.evidence);
-      if (options.rooms && entry.reason.empty() && share <= kClaimedMax &&
-          shared_room(standing[s].drawn, drawn, room_mm) > kInsideMax)
-        entry.reason = "stands inside a better one";
-    }
-    Evidence& evidence = entry.candidate.evidence;
-    evidence[Clue::Claimed] = static_cast<float>(claimed) / static_cast<float>(std::max(1, explained));
-    if (options.explain_away && evidence[Clue::Claimed] > kClaimedMax) entry.reason = "explained by a better one";
-    entry.overshadowed = !entry.reason.empty();
-    if (entry.reason.empty() && score_of(evidence) < options.score_min)
-      entry.reason = what_speaks_against(entry.candidate.test);
-    if (entry.reason.empty()) {
-      for (int r = 0; r < drawn.rows; ++r)
-        for (int c = 0; c < drawn.cols; ++c)
-          if (states[drawn.at(r, c)] == PixelState::Explained) {
-            std::int32_t& at = owner(r + drawn.row0, c + drawn.col0);
-            if (at < 0) at = static_cast<std::int32_t>(standing.size());
-          }
-      standing.push_back({all.size(), std::move(drawn)});
-    }
-    all.push_back(std::move(entry));
-  }
-  for (Selected& entry : all) entry.score = score_of(entry.candidate.evidence);
-  std::stable_sort(all.begin(), all.end(), [](const Selected& a, const Selected& b) { return a.score > b.score; });
-  return all;
+  return Selecting{scene, part, symmetry, std::move(candidates), options}.run();
 }
 }  // namespace binpick::vision

@@ -20,7 +20,9 @@ struct Candidate {
 struct SelectOptions {
   double same_mm = 10;  ///< Poses nearer (surface displacement) are one object.
   double diameter_mm = 100;
-  double radius_mm = 40;  ///< Rms distance of the surface from its centroid.
+  double radius_mm = 40;                                  ///< Rms distance of the surface from its centroid.
+  Eigen::Vector3f centroid_mm = Eigen::Vector3f::Zero();  ///< Object frame.
+  int threads = 2;
   double score_min = 0.1;
   std::function<std::string(const Pose&)> outside;  ///< Why the part cannot be there at all; empty: it can.
   bool rooms = true;                                ///< Two bodies do not share room.
