@@ -13,7 +13,7 @@ namespace {
 /// A turned pose that explains less of what its first one does, as it stands, is not worth refining,
 constexpr float kTurnedShare = 0.5F;
 /// nor are more than so many of one candidate.
-constexpr std::size_t kTurnedRefined = 3;
+constexpr std::size_t kTurnedRefined = 2;
 /// What was not measured speaks a little against a part there: it decides between poses that explain as much.
 constexpr float kMissingWeight = 0.15F;
 }  // namespace

@@ -480,16 +480,21 @@ class Detecting {
       standing.push_back(&c);
       centres.push_back(centre);
     }
-    Grid<std::uint8_t> explained = Grid<std::uint8_t>::Zero(scene_.rows(), scene_.cols());
-    Template drawn;
-    std::vector<PixelState> states;
-    for (const Candidate* c : standing) {
-      finish_.rasteriser().draw(c->pose.R, c->pose.t, scene_.pixel_mm, scene_.origin_mm, drawn, false);
-      compare(scene_, finish_.rasteriser(), c->pose, drawn, states);
+    std::vector<std::vector<std::int32_t>> pixels(standing.size());
+    share(options_.threads, standing.size(), deadline_, [&](std::size_t i, int) {
+      const Pose& pose = standing[i]->pose;
+      Template drawn;
+      std::vector<PixelState> states;
+      finish_.rasteriser().draw(pose.R, pose.t, scene_.pixel_mm, scene_.origin_mm, drawn, false);
+      compare(scene_, finish_.rasteriser(), pose, drawn, states);
       for (int row = 0; row < drawn.rows; ++row)
         for (int col = 0; col < drawn.cols; ++col)
-          if (states[drawn.at(row, col)] == PixelState::Explained) explained(row + drawn.row0, col + drawn.col0) = 1;
-    }
+          if (states[drawn.at(row, col)] == PixelState::Explained)
+            pixels[i].push_back((row + drawn.row0) * scene_.cols() + col + drawn.col0);
+    });
+    Grid<std::uint8_t> explained = Grid<std::uint8_t>::Zero(scene_.rows(), scene_.cols());
+    for (const auto& of_one : pixels)
+      for (const std::int32_t pixel : of_one) explained.data()[pixel] = 1;
     return explained;
   }
 

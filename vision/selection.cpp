@@ -11,6 +11,8 @@ namespace binpick::vision {
 namespace {
 constexpr double kClaimedMax = 0.5;
 constexpr double kInsideMax = 0.12;
+constexpr double kOnePlaceDiameters = 0.06;
+constexpr const char* kExplained = "explained by a better one";
 /// A rival has to speak of mostly the same pixels.
 constexpr double kRivalShare = 0.6;
 
@@ -98,6 +100,11 @@ class Selecting {
            displacement_mm(candidates_[a], candidates_[b], symmetry_, options_.radius_mm) < options_.same_mm;
   }
 
+  /// Two bodies have no centre in common: one glance at the centres tells that this is another pose of the same object.
+  bool in_one_place(std::size_t a, std::size_t b) const {
+    return (centres_[a] - centres_[b]).norm() < static_cast<float>(kOnePlaceDiameters * options_.diameter_mm);
+  }
+
   void show(std::size_t i) {
     const Pose& pose = candidates_[i].pose;
     part_.draw(pose.R, pose.t, scene_.pixel_mm, scene_.origin_mm, shown_[i].drawn, options_.rooms);
@@ -108,8 +115,9 @@ class Selecting {
   void show_likely() {
     std::vector<std::size_t> likely;
     for (std::size_t i = 0; i < candidates_.size(); ++i)
-      if (own_reasons_[i].empty() &&
-          std::none_of(likely.begin(), likely.end(), [&](std::size_t other) { return same(other, i); }))
+      if (own_reasons_[i].empty() && std::none_of(likely.begin(), likely.end(), [&](std::size_t other) {
+            return in_one_place(other, i) || same(other, i);
+          }))
         likely.push_back(i);
     share(options_.threads, likely.size(), Deadline{}, [&](std::size_t k, int) { show(likely[k]); });
   }
@@ -127,8 +135,16 @@ class Selecting {
       return;
     Selected entry{candidates_[i], 0, own_reasons_[i], false};
     if (entry.reason.empty()) {
-      if (shown_[i].states.empty()) show(i);
-      compare_with_standing(i, entry);
+      if (const auto there = std::find_if(standing_.begin(), standing_.end(),
+                                          [&](const Standing& s) { return in_one_place(s.candidate, i); });
+          options_.explain_away && there != standing_.end()) {
+        add_rival(*there, entry);
+        entry.candidate.evidence[Clue::Claimed] = 1;
+        entry.reason = kExplained;
+      } else {
+        if (shown_[i].states.empty()) show(i);
+        compare_with_standing(i, entry);
+      }
       entry.overshadowed = !entry.reason.empty();
       if (entry.reason.empty() && score_of(entry.candidate.evidence) < options_.score_min)
         entry.reason = what_speaks_against(entry.candidate.test);
@@ -140,6 +156,12 @@ class Selecting {
       standing_.push_back({i, all_.size()});
     }
     all_.push_back(std::move(entry));
+  }
+
+  void add_rival(const Standing& standing, const Selected& entry) {
+    Candidate& better = all_[standing.selected].candidate;
+    float& rival = better.evidence[Clue::Rival];
+    rival = std::max(rival, entry.candidate.test.evidence / better.test.evidence);
   }
 
   /// What better ones take from it.
@@ -155,17 +177,14 @@ class Selecting {
     const auto room_mm = static_cast<float>(2 * tolerance_of(scene_) + 0.01 * options_.diameter_mm);
     for (std::size_t s = 0; s < standing_.size(); ++s) {
       const float share = static_cast<float>(claims[s]) / static_cast<float>(std::max(1, explained));
-      Candidate& better = all_[standing_[s].selected].candidate;
-      if (share > kRivalShare)
-        better.evidence[Clue::Rival] =
-            std::max(better.evidence[Clue::Rival], entry.candidate.test.evidence / better.test.evidence);
+      if (share > kRivalShare) add_rival(standing_[s], entry);
       if (options_.rooms && entry.reason.empty() && share <= kClaimedMax &&
           shared_room(shown_[standing_[s].candidate].drawn, shown_[i].drawn, room_mm) > kInsideMax)
         entry.reason = "stands inside a better one";
     }
     Evidence& evidence = entry.candidate.evidence;
     evidence[Clue::Claimed] = static_cast<float>(claimed) / static_cast<float>(std::max(1, explained));
-    if (options_.explain_away && evidence[Clue::Claimed] > kClaimedMax) entry.reason = "explained by a better one";
+    if (options_.explain_away && evidence[Clue::Claimed] > kClaimedMax) entry.reason = kExplained;
   }
 
   const Scene& scene_;
