@@ -66,12 +66,12 @@ ExhaustiveSearch::Place ExhaustiveSearch::place_of(const Eigen::Vector3f& maximu
 }
 
 /// The best of each neighbourhood of rotations.
-void ExhaustiveSearch::thin_out(std::vector<Standing>& found) const {
+void ExhaustiveSearch::thin_out(std::vector<Standing>& found, std::size_t most) const {
   std::sort(found.begin(), found.end(), stronger);
   const auto same = static_cast<float>(std::cos(0.5 * options_.apart_rad));
   std::vector<Standing> kept;
   for (const Standing& s : found) {
-    if (kept.size() >= options_.per_maximum) break;
+    if (kept.size() >= most) break;
     const Eigen::Quaternionf& q = part_.views[s.view].R_supply_object;
     const bool near = std::any_of(kept.begin(), kept.end(), [&](const Standing& other) {
       return std::abs(part_.views[other.view].R_supply_object.dot(q)) > same;
@@ -83,7 +83,7 @@ void ExhaustiveSearch::thin_out(std::vector<Standing>& found) const {
 
 /// Of the rows that passed the first samples, as kernels::ranked, what more of them leave.
 std::vector<Standing> ExhaustiveSearch::standing_at(const Eigen::Vector3f& maximum, std::uint32_t index,
-                                                    std::vector<std::uint32_t> passed) const {
+                                                    const std::vector<std::uint32_t>& passed, std::size_t most) const {
   const Prepared& ready = prepared(part_);
   const std::vector<Prepared::Row>& rows = ready.rows();
   const kernels::Picture picture = picture_of(scene_, false);
@@ -98,9 +98,9 @@ std::vector<Standing> ExhaustiveSearch::standing_at(const Eigen::Vector3f& maxim
                             points.data(), n, options_.tolerance_mm, sum);
     if (sum.evidence > 0) found.push_back({index, rows[i].view, rows[i].anchor, sum.evidence});
   }
-  const std::size_t most = std::min(found.size(), 3 * options_.per_maximum);
-  std::nth_element(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(most), found.end(), stronger);
-  found.resize(most);
+  const std::size_t looked_at = std::min(found.size(), 3 * most);
+  std::nth_element(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(looked_at), found.end(), stronger);
+  found.resize(looked_at);
   for (Standing& s : found) {
     const View& view = part_.views[s.view];
     const Eigen::Vector3f first =
@@ -108,7 +108,7 @@ std::vector<Standing> ExhaustiveSearch::standing_at(const Eigen::Vector3f& maxim
     s.evidence = sparse_evidence(scene_, part_, s.view, first, options_.tolerance_mm);
   }
   std::erase_if(found, [](const Standing& s) { return s.evidence <= 0; });
-  thin_out(found);
+  thin_out(found, most);
   return found;
 }
 
@@ -118,6 +118,8 @@ std::vector<Standing> ExhaustiveSearch::at(const std::vector<Eigen::Vector3f>& m
   const Prepared& ready = prepared(part_);
   const double share_of_one = std::max(kPassedMin, kPassedMax / static_cast<double>(maxima.size()));
   const auto budget = static_cast<std::size_t>(options_.effort * share_of_one);
+  const auto most = std::clamp(static_cast<std::size_t>(options_.in_all / static_cast<double>(maxima.size())),
+                               options_.per_maximum_min, options_.per_maximum_max);
   std::vector<Place> places;
   for (const Eigen::Vector3f& m : maxima) places.push_back(place_of(m));
   // A block of rows stays in the cache while all maxima are tried.
@@ -145,7 +147,7 @@ std::vector<Standing> ExhaustiveSearch::at(const std::vector<Eigen::Vector3f>& m
       best.resize(budget);
     }
     counts[m] = best.size();
-    all[m] = standing_at(maxima[m], static_cast<std::uint32_t>(m), std::move(best));
+    all[m] = standing_at(maxima[m], static_cast<std::uint32_t>(m), best, most);
   });
   std::vector<Standing> found;
   for (std::size_t m = 0; m < maxima.size(); ++m) {

@@ -11,12 +11,14 @@
 /// Nothing is lost but what has no maximum, and the time is known beforehand.
 namespace binpick::vision {
 struct ExhaustiveOptions {
-  float tolerance_mm = 5;        ///< Of the samples; as wide as the grid of rotations is coarse.
-  float z_floor_mm = 0;          ///< No part of the object lies lower.
-  std::size_t per_maximum = 24;  ///< Bound of the views kept for one maximum, each the best of its surroundings.
-  double apart_rad = 0.14;       ///< Views nearer to a better one of the same maximum are dropped.
-  double effort = 1;             ///< Multiplies the bounds.
-  bool all_anchors = true;       ///< Else each view's first only.
+  float tolerance_mm = 5;  ///< Of the samples; as wide as the grid of rotations is coarse.
+  float z_floor_mm = 0;    ///< No part of the object lies lower.
+  /// Bounds of the views kept for one maximum, each the best of its surroundings: the more maxima, the fewer.
+  std::size_t per_maximum_min = 8, per_maximum_max = 24;
+  double in_all = 4000;     ///< Shared evenly between these bounds.
+  double apart_rad = 0.14;  ///< Views nearer to a better one of the same maximum are dropped.
+  double effort = 1;        ///< Multiplies the bounds.
+  bool all_anchors = true;  ///< Else each view's first only.
   int threads = 2;
 };
 
@@ -45,8 +47,8 @@ class ExhaustiveSearch {
   };
   Place place_of(const Eigen::Vector3f& maximum) const;
   std::vector<Standing> standing_at(const Eigen::Vector3f& maximum, std::uint32_t index,
-                                    std::vector<std::uint32_t> passed) const;
-  void thin_out(std::vector<Standing>& found) const;
+                                    const std::vector<std::uint32_t>& passed, std::size_t most) const;
+  void thin_out(std::vector<Standing>& found, std::size_t most) const;
 
   const Scene& scene_;
   const KnowledgeBase::Impl& part_;

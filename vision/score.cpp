@@ -27,6 +27,8 @@ Evidence evidence_of(const DenseTest& test) {
 
 std::array<double, kTerms> terms_of(const Evidence& e) {
   const auto at = [&](Clue clue) { return static_cast<double>(e[clue]); };
+  // Few edges say little: as if a tenth of the outline more were half found.
+  const double edges = (at(Clue::Edges) * at(Clue::EdgeLength) + 0.05) / (at(Clue::EdgeLength) + 0.1);
   const auto root = [](double x) { return std::sqrt(std::max(0.0, x)); };
   return {1.0,
           std::min(0.3, at(Clue::Visible)),
@@ -35,10 +37,10 @@ std::array<double, kTerms> terms_of(const Evidence& e) {
           root(at(Clue::Contradicted)),
           at(Clue::Border),
           at(Clue::Missing),
-          at(Clue::Edges),
-          at(Clue::Edges) * at(Clue::Edges),
-          std::min(1.0, at(Clue::EdgeLength)),
-          std::min(1.0, at(Clue::EdgeLength)) * at(Clue::Edges),
+          edges,
+          edges * edges,
+          std::min(1.0, at(Clue::EdgeLength) * at(Clue::Edges)),
+          root(at(Clue::EdgeLength) * (1 - at(Clue::Edges))),
           at(Clue::Normals),
           at(Clue::Curvature),
           at(Clue::Fit),

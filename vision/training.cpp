@@ -207,8 +207,7 @@ Expected<KnowledgeBase, MeshError> train(const Mesh& mesh, const PartOptions& op
   if (part.diameter_mm < 4 * part.pixel_mm)
     return failed("the part's diameter is " + mm(part.diameter_mm) + ", too small for pixels of " + mm(part.pixel_mm) +
                   "; check mesh_unit, pixel_mm and scanner");
-  const int asked =
-      std::clamp(options.rotations.value_or(10'000), 1, kRotationsMax);
+  const int asked = std::clamp(options.rotations.value_or(10'000), 1, kRotationsMax);
   std::vector<Eigen::Quaterniond> rotations = training_rotations(asked, part.symmetry);
   part.rotation_gap_rad = gap_rad(asked, part.symmetry);
   std::size_t resting = 0;

@@ -12,7 +12,8 @@ namespace {
 constexpr std::string_view kTune = "alarms-tune", kReport = "alarms-report";
 constexpr std::uint64_t kTunePile = 8'001, kReportPile = 9'001, kPiles = 6;
 
-/// Bricks or bolts of about the size of the class's parts.
+/// Bricks or bolts of about the size of the class's parts. (The bolt's shank is no shaft of ours: one of the same
+/// radius, its other end in the bolt's head, could not be told from a shaft.)
 ScenePart foreign_part(const ClassSetting& setting, bool bolt) {
   const auto size = static_cast<float>(0.3 * std::min(setting.supply_mm.y(), 450.0));
   ScenePart part;
@@ -20,9 +21,9 @@ ScenePart foreign_part(const ClassSetting& setting, bool bolt) {
   part.pile = 30;
   if (bolt) {
     part.body.name = "bolt";
-    part.body.mesh = emulators::shapes::turn(0, {{0.2F * size, 0.25F * size, 0}, {size, 0.13F * size, 0}}, 24);
+    part.body.mesh = emulators::shapes::turn(0, {{0.2F * size, 0.25F * size, 0}, {size, 0.11F * size, 0}}, 24);
     part.body.pieces = {emulators::cylinder_piece(0.25F * size, 0, 0.2F * size, 24),
-                        emulators::cylinder_piece(0.13F * size, 0.2F * size, size, 24)};
+                        emulators::cylinder_piece(0.11F * size, 0.2F * size, size, 24)};
   } else {
     part.body.name = "brick";
     const Eigen::Vector3f half = size * Eigen::Vector3f{0.45F, 0.21F, 0.14F};

@@ -8,6 +8,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "bench/scenes/alarm_scenes.hpp"
 #include "bench/scenes/classes.hpp"
 #include "bench/scenes/figures.hpp"
 #include "vision/score.hpp"
@@ -16,13 +17,17 @@ namespace binpick::bench {
 namespace {
 using Terms = Eigen::Matrix<double, vision::kTerms, 1>;
 constexpr double kRidge = 0.3;
+/// A wrong pose where nothing is to be found is worse than one among many right ones.
+constexpr double kAlarmWeight = 2;
 constexpr int kSteps = 100;
-constexpr std::array kRivalScales{0.003, 0.004, 0.006, 0.008, 0.016, 0.03};
+/// No wider: a rival two per cent short of an object that lies open is no coin.
+constexpr std::array kRivalScales{0.0005, 0.001, 0.002, 0.003, 0.004, 0.006, 0.008};
 
 struct Example {
   Terms terms;
   double rival = 0;
   bool right = false;
+  double weight = 1;
 };
 
 Example example_of(const vision::Evidence& evidence, bool right) {
@@ -36,11 +41,15 @@ bool overshadowed(const RejectionLine& rejection) {
 
 /// What one scene teaches.
 void add_scene(const SceneLine& scene, const Judge& judge, std::vector<Example>& examples) {
+  const std::size_t before = examples.size();
   const Match found = match(judge.judged(scene), -1);
   std::set<int> known;
   for (std::size_t i = 0; i < scene.detections.size(); ++i) {
+    const int truth = found.truth[i];
+    if (truth >= 0) known.insert(truth);
+    // Of what cannot be told, only the judge is indifferent.
+    if (truth >= 0 && !scene.truths[static_cast<std::size_t>(truth)].told) continue;
     examples.push_back(example_of(scene.detections[i].evidence, found.verdict[i] != Verdict::Wrong));
-    if (found.truth[i] >= 0) known.insert(found.truth[i]);
   }
   for (const RejectionLine& r : scene.rejected) {
     if (overshadowed(r)) continue;
@@ -51,15 +60,18 @@ void add_scene(const SceneLine& scene, const Judge& judge, std::vector<Example>&
           judge.measure(scene.truths[k].told).distance_mm(r.T_supply_object, scene.truths[k].T_supply_object);
       if (d < least) least = d, nearest = static_cast<int>(k);
     }
-    if (nearest >= 0 && known.contains(nearest)) continue;  // once more what is found already
+    // Once more what is found already, or what cannot be told.
+    if (nearest >= 0 && (known.contains(nearest) || !scene.truths[static_cast<std::size_t>(nearest)].told)) continue;
     examples.push_back(example_of(r.evidence, nearest >= 0));
   }
+  if (is_alarm_split(scene.split))
+    for (std::size_t i = before; i < examples.size(); ++i) examples[i].weight = kAlarmWeight;
 }
 
 struct Fit {
   Terms weights = Terms::Zero();
   double rival_scale = 0;
-  double loss = 0;  ///< Mean of -log of the probability of what was so.
+  double loss = 0;  ///< Mean of the weighted -log of the probability of what was so.
 };
 
 double by_itself(const Fit& fit, const Example& e) { return 1 / (1 + std::exp(-fit.weights.dot(e.terms))); }
@@ -81,8 +93,8 @@ Fit fitted(const std::vector<Example>& examples, double rival_scale) {
       const double own = by_itself(fit, e), all = probability(fit, e);
       const double slope = all * (1 - own);  // of `all` by the logit
       const double spread = std::max(1e-12, all * (1 - all));
-      gradient += ((e.right ? 1.0 : 0.0) - all) * slope / spread * e.terms;
-      curvature += slope * slope / spread * e.terms * e.terms.transpose();
+      gradient += e.weight * ((e.right ? 1.0 : 0.0) - all) * slope / spread * e.terms;
+      curvature += e.weight * slope * slope / spread * e.terms * e.terms.transpose();
     }
     const Terms delta = curvature.ldlt().solve(gradient);
     fit.weights += delta;
@@ -90,7 +102,7 @@ Fit fitted(const std::vector<Example>& examples, double rival_scale) {
   }
   for (const Example& e : examples) {
     const double p = probability(fit, e);
-    fit.loss -= std::log(std::max(1e-12, e.right ? p : 1 - p)) / static_cast<double>(examples.size());
+    fit.loss -= e.weight * std::log(std::max(1e-12, e.right ? p : 1 - p)) / static_cast<double>(examples.size());
   }
   return fit;
 }
