@@ -15,7 +15,7 @@ constexpr float kTurnedShare = 0.5F;
 /// nor are more than so many of one candidate.
 constexpr std::size_t kTurnedRefined = 2;
 /// What was not measured speaks a little against a part there: it decides between poses that explain as much.
-constexpr float kMissingWeight = 0.15F;
+constexpr float kMissingWeight = 0.1F, kUnseenWeight = 0.5F;
 }  // namespace
 
 Finisher::Finisher(const Scene& scene, const KnowledgeBase::Impl& part, const Deadline& deadline,
@@ -71,7 +71,9 @@ Candidate Finisher::finished(Pose pose, Template& drawn) const {
   if (candidate.test.evidence < 0) return candidate;  // hopeless
   rasteriser_.draw(pose.R, pose.t, scene_.pixel_mm, scene_.origin_mm, drawn, false);
   candidate.test = dense_test(scene_, rasteriser_, pose, drawn);
-  candidate.test.evidence -= kMissingWeight * static_cast<float>(candidate.test.missing);
+  candidate.test.unseen = unseen_pixels(scene_, *shadows_, rasteriser_, pose.R, drawn);
+  candidate.test.evidence -= kMissingWeight * static_cast<float>(candidate.test.missing) +
+                             kUnseenWeight * static_cast<float>(candidate.test.unseen);
   candidate.evidence = evidence_of(candidate.test);
   candidate.evidence[Clue::Looseness] = looseness_of(candidate);
   return candidate;

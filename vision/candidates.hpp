@@ -1,10 +1,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "vision/knowledge_base_impl.hpp"
 #include "vision/selection.hpp"
+#include "vision/shadows.hpp"
 #include "vision/team.hpp"
 
 /// From a pose that may be right to one that is refined and tested by its own render.
@@ -20,6 +22,8 @@ class Finisher {
   /// All of it is used until the finisher goes.
   Finisher(const Scene& scene, const KnowledgeBase::Impl& part, const Deadline& deadline, const FinishOptions& options);
 
+  /// To be called once the scene is prepared, before all else.
+  void begin() { shadows_.emplace(scene_); }
   /// Evidence of the poses as they are by a coarse render: cheaper than refinement by far.
   std::vector<float> looked_at(const std::vector<Pose>& poses) const;
   /// Refined against its own render, twice; then the rendered test.
@@ -42,6 +46,7 @@ class Finisher {
   std::vector<Template> canvases() const;
 
   const Scene& scene_;
+  std::optional<Shadows> shadows_;
   const KnowledgeBase::Impl& part_;
   const Deadline& deadline_;
   FinishOptions options_;

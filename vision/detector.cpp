@@ -109,6 +109,7 @@ class Detecting {
     floor_mm_ = floor_of(scene_, supply_);
     lowest_allowed_mm_ =
         static_cast<float>(floor_mm_ - std::max(3 * noise_mm_, kFloorGateDiameters * coarseness() * part_.diameter_mm));
+    finish_.begin();
     ended("surface");
     const std::vector<Eigen::Vector3f> maxima = anchors();
     report_.maxima = maxima.size();

@@ -11,6 +11,7 @@ enum class Clue : std::size_t {
   Contradicted,  ///< Share of what is visible that one sees through, away from the model's edges.
   Border,        ///< The same beside the model's edges.
   Missing,       ///< Share of the silhouette that was not measured.
+  Unseen,        ///< Share of the silhouette that was not measured although nothing hides it.
   Edges,         ///< Share of the model's depth edges found where they can be told.
   EdgeLength,    ///< How many can be told, over four times the root of the silhouette's pixels.
   Normals,       ///< Share of explained pixels with the model's normal.
@@ -20,12 +21,13 @@ enum class Clue : std::size_t {
   Looseness,     ///< Decimal logarithm of the pose's standard deviation, as displacement in part diameters.
   Claimed,       ///< Share of the explained pixels that better poses explain.
   Rival,         ///< Evidence of the best other pose of the same place over its own.
+  Company,       ///< Mean probability of the scene's other poses by themselves; a half where there are none.
 };
-inline constexpr std::array<std::string_view, 13> kClueNames{"visible", "contradicted", "contradicted at edges",
-                                                             "missing", "edges",        "edge length",
-                                                             "normals", "curvature",    "fit",
-                                                             "size",    "looseness",    "claimed",
-                                                             "rival"};
+inline constexpr std::array<std::string_view, 15> kClueNames{"visible",     "contradicted", "contradicted at edges",
+                                                             "missing",     "unseen",       "edges",
+                                                             "edge length", "normals",      "curvature",
+                                                             "fit",         "size",         "looseness",
+                                                             "claimed",     "rival",        "company"};
 
 struct Evidence {
   std::array<float, kClueNames.size()> clues{};

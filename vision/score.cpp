@@ -6,6 +6,13 @@
 namespace binpick::vision {
 namespace {
 #include "vision/score_weights.inc"
+
+template <std::size_t N>
+double logistic(const std::array<double, N>& weights, const std::array<double, N>& terms) {
+  double logit = 0;
+  for (std::size_t k = 0; k < N; ++k) logit += weights[k] * terms[k];
+  return 1 / (1 + std::exp(-logit));
+}
 }  // namespace
 
 Evidence evidence_of(const DenseTest& test) {
@@ -16,11 +23,13 @@ Evidence evidence_of(const DenseTest& test) {
   e[Clue::Contradicted] = static_cast<float>(test.contradicted - test.contradicted_border) / seen;
   e[Clue::Border] = static_cast<float>(test.contradicted_border) / seen;
   e[Clue::Missing] = static_cast<float>(test.missing) / pixels;
+  e[Clue::Unseen] = static_cast<float>(test.unseen) / pixels;
   e[Clue::Edges] = test.edge_ratio();
   e[Clue::EdgeLength] = static_cast<float>(test.edges_found + test.edges_missing) / (4 * std::sqrt(pixels));
   e[Clue::Normals] = test.normal_agreement;
   e[Clue::Curvature] = test.bend_agreement;
   e[Clue::Fit] = test.fit;
+  e[Clue::Company] = 0.5F;
   e[Clue::Size] = std::log10(static_cast<float>(std::max(1, test.explained)));
   return e;
 }
@@ -37,6 +46,7 @@ std::array<double, kTerms> terms_of(const Evidence& e) {
           root(at(Clue::Contradicted)),
           at(Clue::Border),
           at(Clue::Missing),
+          root(at(Clue::Unseen)),
           edges,
           edges * edges,
           std::min(1.0, at(Clue::EdgeLength) * at(Clue::Edges)),
@@ -51,10 +61,24 @@ std::array<double, kTerms> terms_of(const Evidence& e) {
 
 double against_rival(double rival, double scale) { return 1 / (1 + std::exp((rival - 1) / scale)); }
 
+double score_by_itself(const Evidence& evidence) { return logistic(kWeights, terms_of(evidence)); }
+
+double company(double sum_of_others, std::size_t others) {
+  return (sum_of_others + 0.5) / (static_cast<double>(others) + 1);
+}
+
+std::array<double, 3> second_terms(double by_itself, double company) {
+  const auto logit = [](double p) {
+    constexpr double kLeast = 1e-6;
+    const double q = std::clamp(p, kLeast, 1 - kLeast);
+    return std::log(q / (1 - q));
+  };
+  return {1, logit(by_itself), logit(company)};
+}
+
 double score_of(const Evidence& evidence) {
-  const auto terms = terms_of(evidence);
-  double logit = 0;
-  for (std::size_t k = 0; k < kTerms; ++k) logit += kWeights[k] * terms[k];
-  return against_rival(static_cast<double>(evidence[Clue::Rival]), kRivalScale) / (1 + std::exp(-logit));
+  return against_rival(static_cast<double>(evidence[Clue::Rival]), kRivalScale) *
+         logistic(kSecondWeights,
+                  second_terms(score_by_itself(evidence), static_cast<double>(evidence[Clue::Company])));
 }
 }  // namespace binpick::vision

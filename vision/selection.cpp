@@ -85,6 +85,7 @@ class Selecting {
   std::vector<Selected> run() {
     show_likely();
     for (std::size_t i = 0; i < candidates_.size(); ++i) judge(i);
+    tell_company();
     for (Selected& entry : all_) entry.score = score_of(entry.candidate.evidence);
     std::stable_sort(all_.begin(), all_.end(), [](const Selected& a, const Selected& b) { return a.score > b.score; });
     return std::move(all_);
@@ -156,6 +157,18 @@ class Selecting {
       standing_.push_back({i, all_.size()});
     }
     all_.push_back(std::move(entry));
+  }
+
+  void tell_company() {
+    double sum = 0;
+    std::size_t count = 0;
+    for (const Selected& entry : all_)
+      if (!entry.overshadowed) sum += score_by_itself(entry.candidate.evidence), ++count;
+    for (Selected& entry : all_) {
+      Evidence& evidence = entry.candidate.evidence;
+      evidence[Clue::Company] = static_cast<float>(
+          entry.overshadowed ? company(sum, count) : company(sum - score_by_itself(evidence), count - 1));
+    }
   }
 
   void add_rival(const Standing& standing, const Selected& entry) {

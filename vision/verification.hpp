@@ -41,6 +41,7 @@ struct DenseTest {
   int contradicted_border = 0;  ///< Of these, beside an edge of the model: may be half a pixel of pose error.
   int occluded = 0;             ///< Measured above the model: something lies on it.
   int missing = 0;              ///< Not measured, or outside the picture.
+  int unseen = 0;               ///< Of these, what nothing hides (shadows.hpp); not counted by dense_test().
   float fit = 0;                ///< Explained pixels, each weighted by how well, over explained pixels.
   int edges_found = 0;          ///< Depth jumps of the model that the scene has too.
   int edges_missing = 0;        ///< Depth jumps of the model where the measured surface goes on.

@@ -15,7 +15,6 @@
 
 namespace binpick::bench {
 namespace {
-using Terms = Eigen::Matrix<double, vision::kTerms, 1>;
 constexpr double kRidge = 0.3;
 /// A wrong pose where nothing is to be found is worse than one among many right ones.
 constexpr double kAlarmWeight = 2;
@@ -24,15 +23,16 @@ constexpr int kSteps = 100;
 constexpr std::array kRivalScales{0.0005, 0.001, 0.002, 0.003, 0.004, 0.006, 0.008};
 
 struct Example {
-  Terms terms;
+  Eigen::VectorXd terms;
   double rival = 0;
   bool right = false;
   double weight = 1;
+  std::size_t scene = 0;
 };
 
 Example example_of(const vision::Evidence& evidence, bool right) {
   const auto terms = vision::terms_of(evidence);
-  return {Eigen::Map<const Terms>(terms.data()), evidence[vision::Clue::Rival], right};
+  return {Eigen::Map<const Eigen::VectorXd>(terms.data(), vision::kTerms), evidence[vision::Clue::Rival], right};
 }
 
 bool overshadowed(const RejectionLine& rejection) {
@@ -40,7 +40,7 @@ bool overshadowed(const RejectionLine& rejection) {
 }
 
 /// What one scene teaches.
-void add_scene(const SceneLine& scene, const Judge& judge, std::vector<Example>& examples) {
+void add_scene(const SceneLine& scene, const Judge& judge, std::size_t number, std::vector<Example>& examples) {
   const std::size_t before = examples.size();
   const Match found = match(judge.judged(scene), -1);
   std::set<int> known;
@@ -64,12 +64,14 @@ void add_scene(const SceneLine& scene, const Judge& judge, std::vector<Example>&
     if (nearest >= 0 && (known.contains(nearest) || !scene.truths[static_cast<std::size_t>(nearest)].told)) continue;
     examples.push_back(example_of(r.evidence, nearest >= 0));
   }
-  if (is_alarm_split(scene.split))
-    for (std::size_t i = before; i < examples.size(); ++i) examples[i].weight = kAlarmWeight;
+  for (std::size_t i = before; i < examples.size(); ++i) {
+    examples[i].scene = number;
+    if (is_alarm_split(scene.split)) examples[i].weight = kAlarmWeight;
+  }
 }
 
 struct Fit {
-  Terms weights = Terms::Zero();
+  Eigen::VectorXd weights;
   double rival_scale = 0;
   double loss = 0;  ///< Mean of the weighted -log of the probability of what was so.
 };
@@ -84,11 +86,11 @@ double probability(const Fit& fit, const Example& e) {
 Fit fitted(const std::vector<Example>& examples, double rival_scale) {
   Fit fit;
   fit.rival_scale = rival_scale;
+  const Eigen::Index terms = examples.front().terms.size();
+  fit.weights = Eigen::VectorXd::Zero(terms);
   for (int step = 0; step < kSteps; ++step) {
-    Eigen::Matrix<double, vision::kTerms, vision::kTerms> curvature;
-    curvature.setIdentity();
-    curvature *= kRidge;
-    Terms gradient = -kRidge * fit.weights;
+    Eigen::MatrixXd curvature = kRidge * Eigen::MatrixXd::Identity(terms, terms);
+    Eigen::VectorXd gradient = -kRidge * fit.weights;
     for (const Example& e : examples) {
       const double own = by_itself(fit, e), all = probability(fit, e);
       const double slope = all * (1 - own);  // of `all` by the logit
@@ -96,7 +98,7 @@ Fit fitted(const std::vector<Example>& examples, double rival_scale) {
       gradient += e.weight * ((e.right ? 1.0 : 0.0) - all) * slope / spread * e.terms;
       curvature += e.weight * slope * slope / spread * e.terms * e.terms.transpose();
     }
-    const Terms delta = curvature.ldlt().solve(gradient);
+    const Eigen::VectorXd delta = curvature.ldlt().solve(gradient);
     fit.weights += delta;
     if (delta.norm() < 1e-6) break;
   }
@@ -106,33 +108,58 @@ Fit fitted(const std::vector<Example>& examples, double rival_scale) {
   }
   return fit;
 }
+/// The same poses as the second step sees them: by themselves, and in the company of their scene's others.
+std::vector<Example> in_company(const std::vector<Example>& examples, const Fit& first) {
+  std::map<std::size_t, std::pair<double, std::size_t>> scenes;
+  for (const Example& e : examples) {
+    auto& [sum, count] = scenes[e.scene];
+    sum += by_itself(first, e);
+    ++count;
+  }
+  std::vector<Example> second = examples;
+  for (Example& e : second) {
+    const auto& [sum, count] = scenes[e.scene];
+    const double own = by_itself(first, e);
+    const auto terms = vision::second_terms(own, vision::company(sum - own, count - 1));
+    e.terms = Eigen::Map<const Eigen::VectorXd>(terms.data(), static_cast<Eigen::Index>(terms.size()));
+  }
+  return second;
+}
+
+void print(const char* name, const char* size, const Eigen::VectorXd& weights) {
+  std::printf("constexpr std::array<double, %s> %s{", size, name);
+  for (Eigen::Index k = 0; k < weights.size(); ++k) std::printf("%s%.4g", k == 0 ? "" : ", ", weights[k]);
+  std::printf("};\n");
+}
 }  // namespace
 
 void calibrate(const std::vector<std::string>& folders) {
   std::vector<Example> examples;
+  std::size_t scenes = 0;
   std::map<std::string, Judge> judges;
   for (const std::string& folder : folders)
     for (const auto& [key, scene] : read_run(folder).scenes) {
       if (scene.detector != "binpick") continue;
       const auto it = judges.try_emplace(scene.scanner + ' ' + scene.part,
                                          scene_part(find_setting(scene.scanner)->scanner, scene.part));
-      add_scene(scene, it.first->second, examples);
+      add_scene(scene, it.first->second, scenes++, examples);
     }
   if (examples.empty()) throw std::runtime_error{"no scene to learn from"};
   Fit best;
   for (const double scale : kRivalScales)
     if (const Fit fit = fitted(examples, scale); best.rival_scale == 0 || fit.loss < best.loss) best = fit;
+  const std::vector<Example> second = in_company(examples, best);
+  const Fit last = fitted(second, best.rival_scale);
   std::vector<Believed> believed;
   double right = 0;
-  for (const Example& e : examples) {
-    believed.push_back({probability(best, e), e.right});
+  for (const Example& e : second) {
+    believed.push_back({probability(last, e), e.right});
     right += e.right;
   }
-  std::printf("// %zu poses, %.0f of them right; log loss %.4f, calibration error %.4f.\n", examples.size(), right,
-              best.loss, calibration_error(believed));
-  std::printf("constexpr double kRivalScale = %g;\nconstexpr std::array<double, kTerms> kWeights{", best.rival_scale);
-  for (std::size_t k = 0; k < vision::kTerms; ++k)
-    std::printf("%s%.4g", k == 0 ? "" : ", ", best.weights[static_cast<Eigen::Index>(k)]);
-  std::printf("};\n");
+  std::printf("// %zu poses of %zu scenes, %.0f of them right; log loss %.4f and %.4f, calibration error %.4f.\n",
+              examples.size(), scenes, right, best.loss, last.loss, calibration_error(believed));
+  std::printf("constexpr double kRivalScale = %g;\n", best.rival_scale);
+  print("kWeights", "kTerms", best.weights);
+  print("kSecondWeights", "3", last.weights);
 }
 }  // namespace binpick::bench

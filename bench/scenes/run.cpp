@@ -49,7 +49,7 @@ class PartRun {
     const auto begin = SteadyClock::now();
     const std::vector<ObjectPose> pile = taken_down(settled_pile(part_, id.pile, options_.piles), id.fill);
     const double settled_ms = ms_since(begin);
-    const Scene scene = make_scene(part_, pile, id, options_.bias_mm);
+    const Scene scene = make_scene(part_, pile, id, options_.bias_mm, options_.sparse);
     const double scanned_ms = ms_since(begin) - settled_ms;
     for (auto [line, contender] : wanted) {
       line.pile = id.pile;
@@ -91,6 +91,7 @@ RunHeader RunOptions::header() const {
   header.commit = kCommit;
   header.options["threads"] = std::to_string(threads);
   if (hypotheses_max > 0) header.options["hypotheses"] = std::to_string(hypotheses_max);
+  if (sparse != 1) header.options["sparse"] = std::to_string(sparse);
   if (bias_mm != 0) header.options["bias_mm"] = std::to_string(bias_mm);
   for (const std::string& name : without) header.options["without"] += name + ';';
   const std::string loops = vision::kernels::table().name;
@@ -118,12 +119,13 @@ vision::DetectorOptions RunOptions::thorough() const {
   return thorough;
 }
 
-Scene make_scene(const ScenePart& part, const std::vector<ObjectPose>& poses, const SceneId& id, double bias_mm) {
+Scene make_scene(const ScenePart& part, const std::vector<ObjectPose>& poses, const SceneId& id, double bias_mm,
+                 double sparse) {
   const ClassSetting setting = setting_of(part);
   emulators::World world{setting.supply_mm};
   const auto mesh = std::make_shared<const emulators::RayMesh>(part.body.mesh);
   for (const ObjectPose& pose : poses) world.add(part.body.name, mesh, pose);
-  const std::vector<Profile> lines = sweep_lines(setting, id.noise);
+  const std::vector<Profile> lines = sweep_lines(setting, id.noise, sparse);
   const auto ideal = ideal_sweep(setting, lines, world);
   return {id, setting.supply_mm, truths_of(part, setting, lines, ideal, world),
           measured_points(setting, lines, ideal, world, {id.noise, bias_mm})};

@@ -18,6 +18,7 @@ struct RunOptions {
   int threads = 2;
   int hypotheses_max = 0;  ///< 0: the detector's default.
   double bias_mm = 0;
+  double sparse = 1;  ///< Points farther apart than the class's, by this factor.
   std::vector<std::string> without;
   std::size_t peer_scenes = 0;  ///< So many of a part's first scenes are shown to OpenCV's surface_matching as well,
   std::size_t thorough_scenes = 0;  ///< and so many to our own search with all that it can try.
@@ -35,7 +36,8 @@ struct Scene {
   std::vector<Truth> truths;
   std::vector<Eigen::Vector3f> points;
 };
-Scene make_scene(const ScenePart& part, const std::vector<ObjectPose>& poses, const SceneId& id, double bias_mm);
+Scene make_scene(const ScenePart& part, const std::vector<ObjectPose>& poses, const SceneId& id, double bias_mm,
+                 double sparse = 1);
 
 /// Trained for the class, or read from `file` where it is.
 vision::KnowledgeBase knowledge_base_of(const ScenePart& part, const std::string& file);

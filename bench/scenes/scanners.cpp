@@ -35,16 +35,17 @@ std::vector<Vector3f> Profile::directions() const {
   return turned;
 }
 
-std::vector<Profile> sweep_lines(const ClassSetting& setting, std::uint64_t seed) {
+std::vector<Profile> sweep_lines(const ClassSetting& setting, std::uint64_t seed, double sparse) {
   const vision::ScannerFigures& figures = vision::figures_of(setting.scanner);
   const double half_x = setting.supply_mm.x() / 2 + kBeyond_mm, half_y = setting.supply_mm.y() / 2 + kBeyond_mm;
   const double fan = std::atan(half_x / figures.stand_off_mm);
-  const double step = setting.triangulation ? figures.spacing_across_mm / figures.stand_off_mm : kLms400Step_rad;
+  const double step =
+      sparse * (setting.triangulation ? figures.spacing_across_mm / figures.stand_off_mm : kLms400Step_rad);
   std::vector<Vector3f> rays;
   for (double a = -fan; a <= fan; a += step) rays.push_back(Vector3d{std::sin(a), 0, -std::cos(a)}.cast<float>());
   emulators::Random random{emulators::mixed(seed, 1)};
   std::vector<Profile> lines;
-  for (double y = -half_y; y <= half_y; y += figures.spacing_along_mm) {
+  for (double y = -half_y; y <= half_y; y += sparse * figures.spacing_along_mm) {
     Eigen::Isometry3d believed = Eigen::Isometry3d::Identity();
     believed.translation() = Vector3d{0, setting.triangulation ? y : 0, figures.stand_off_mm};
     if (!setting.triangulation)

@@ -23,7 +23,7 @@ struct Profile {
 };
 
 /// The lines of one sweep over the whole supply. `seed`: of the carrier's jitter.
-std::vector<Profile> sweep_lines(const ClassSetting& setting, std::uint64_t seed);
+std::vector<Profile> sweep_lines(const ClassSetting& setting, std::uint64_t seed, double sparse = 1);
 
 /// What lies where a ray meets something, as far as the device can see it at all.
 struct Echo {

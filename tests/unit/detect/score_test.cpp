@@ -1,0 +1,102 @@
+#include "vision/score.hpp"
+
+#include <cmath>
+#include <gtest/gtest.h>
+#include <limits>
+
+#include "vision/shadows.hpp"
+
+namespace binpick::vision {
+namespace {
+/// What a pose looks like that lies open and fits.
+DenseTest good_test() {
+  DenseTest test;
+  test.pixels = 1000;
+  test.explained = 900;
+  test.occluded = 100;
+  test.fit = 0.95F;
+  test.edges_found = 100;
+  test.edges_missing = 5;
+  test.normal_agreement = 0.97F;
+  test.bend_agreement = 0.7F;
+  return test;
+}
+
+Evidence good_evidence() {
+  Evidence evidence = evidence_of(good_test());
+  evidence[Clue::Looseness] = -2.3F;
+  return evidence;
+}
+
+TEST(Score, FallsWithWhatSpeaksAgainst) {
+  const double good = score_of(good_evidence());
+  EXPECT_GT(good, 0.95);
+  const auto with = [](Clue clue, float value) {
+    Evidence evidence = good_evidence();
+    evidence[clue] = value;
+    return score_of(evidence);
+  };
+  EXPECT_LT(with(Clue::Contradicted, 0.2F), good - 0.02);
+  EXPECT_LT(with(Clue::Edges, 0.2F), good - 0.02);
+  EXPECT_LT(with(Clue::Looseness, -0.5F), good - 0.02);
+  EXPECT_LT(with(Clue::Normals, 0.3F), good);
+}
+
+TEST(Score, ARivalThatExplainsAsMuchIsACoin) {
+  EXPECT_DOUBLE_EQ(against_rival(1, 0.01), 0.5);
+  EXPECT_GT(against_rival(0.9, 0.01), 0.99);
+  Evidence evidence = good_evidence();
+  evidence[Clue::Rival] = 1;
+  EXPECT_LE(score_of(evidence), 0.5);
+}
+
+TEST(Score, NothingElseOfThePartMakesAPoseLessLikely) {
+  EXPECT_DOUBLE_EQ(company(0, 0), 0.5);
+  EXPECT_LT(company(0.2, 10), 0.1);
+  Evidence alone = good_evidence(), among_strangers = alone;
+  among_strangers[Clue::Company] = 0.03F;
+  EXPECT_LT(score_of(among_strangers), score_of(alone));
+}
+
+TEST(Score, TermsOfAnythingAreFinite) {
+  for (const double term : terms_of(Evidence{})) EXPECT_TRUE(std::isfinite(term));
+  for (const double by_itself : {0.0, 1.0})
+    for (const double term : second_terms(by_itself, company(0, 5))) EXPECT_TRUE(std::isfinite(term));
+}
+
+/// 60 × 60 pixels of 1 mm at a height of 10, nothing measured at x = 40 … 49, and a post of 60 mm at x = 30.
+Scene scene_with_a_hole(bool post) {
+  Scene scene;
+  scene.pixel_mm = 1;
+  scene.z_mm = Grid<float>::Constant(60, 60, 10);
+  scene.z_mm.middleCols(40, 10).setConstant(std::numeric_limits<float>::quiet_NaN());
+  if (post) scene.z_mm.col(30).setConstant(60);
+  return scene;
+}
+
+TEST(Shadows, ReachAsFarAsTheSlantAllows) {
+  const Scene scene = scene_with_a_hole(true);
+  const Shadows shadows{scene};
+  // 50 mm above, seen past a slant of 0.4: 20 mm beside the post.
+  EXPECT_TRUE(shadows.may_hide(30, 44, 10));
+  EXPECT_FALSE(shadows.may_hide(30, 44, 50));
+  EXPECT_FALSE(shadows.may_hide(30, 56, 10.5F));
+  EXPECT_FALSE(Shadows{scene_with_a_hole(false)}.may_hide(30, 44, 10.5F));
+}
+
+TEST(Shadows, WhatNothingHidesIsUnseen) {
+  Mesh plate;
+  plate.vertices_mm = {{0, 0, 20}, {50, 0, 20}, {50, 50, 20}, {0, 50, 20}};
+  plate.triangles = {{0, 1, 2}, {0, 2, 3}};
+  const Rasteriser part{plate};
+  const auto unseen = [&](const Scene& scene) {
+    Template drawn;
+    part.draw(Eigen::Matrix3f::Identity(), Eigen::Vector3f(5, 5, 0), scene.pixel_mm, scene.origin_mm, drawn);
+    return unseen_pixels(scene, Shadows{scene}, part, Eigen::Matrix3f::Identity(), drawn);
+  };
+  EXPECT_NEAR(unseen(scene_with_a_hole(false)), 10 * 51, 60);
+  // The post hides 16 mm of the plate beside it, to the cell: three or four of the ten columns are left.
+  EXPECT_NEAR(unseen(scene_with_a_hole(true)), 3.5 * 51, 51);
+}
+}  // namespace
+}  // namespace binpick::vision
