@@ -51,9 +51,8 @@ constexpr double kScoreMin = 0.1;
 /// From this on a pose is valid by itself.
 constexpr double kValidScore = 0.5;
 
-constexpr std::array<std::string_view, 10> kAdditions{"edges",        "first look",  "turned",      "rooms",
-                                                      "explain away", "second pass", "all anchors", "second refinement",
-                                                      "normals",      "curvature"};
+constexpr std::array<std::string_view, 8> kAdditions{"edges",        "first look",  "turned",      "rooms",
+                                                     "explain away", "second pass", "all anchors", "second refinement"};
 
 /// The memory of the last scene, for the next one of this thread.
 Scene& spare_scene() {
