@@ -84,7 +84,7 @@ void Finisher::add_turned(std::vector<Candidate>& candidates, std::size_t most, 
   for (const Candidate& c : candidates) {
     if (strongest.size() >= most) break;
     const bool again = std::any_of(strongest.begin(), strongest.end(), [&](const Candidate& other) {
-      return displacement_mm(other, c, part_.symmetry, radius_mm_) < same_mm;
+      return displacement_mm(other.pose, c.pose, part_.symmetry, radius_mm_) < same_mm;
     });
     if (!again) strongest.push_back(c);
   }
@@ -115,27 +115,40 @@ void Finisher::add_turned(std::vector<Candidate>& candidates, std::size_t most, 
     if (c.test.evidence > 0) candidates.push_back(c);
 }
 
-/// Quarter turns about the principal axes; steps of 15 degrees about an axis that the part is nearly round about (a
-/// wheel's spokes are found by the next edge only). None that the symmetry makes another's equal.
-std::vector<Eigen::Matrix3f> Finisher::principal_turns() const {
+std::array<Finisher::Principal, 3> Finisher::principal_axes() const {
   constexpr double kNearlyRound = 0.8;
-  constexpr double kStepRad = std::numbers::pi / 12;
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
   for (const Eigen::Vector3f& v : part_.mesh.vertices_mm) {
     const Eigen::Vector3d d = (v - centroid_).cast<double>();
     spread += d * d.transpose();
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> principal(spread);
-  const Eigen::Vector3d centroid = centroid_.cast<double>();
-  std::vector<Eigen::Isometry3d> distinct{Eigen::Isometry3d::Identity()};
+  std::array<Principal, 3> axes;
   for (int axis = 0; axis < 3; ++axis) {
     const double a = principal.eigenvalues()[(axis + 1) % 3], b = principal.eigenvalues()[(axis + 2) % 3];
-    const int steps = std::min(a, b) > kNearlyRound * std::max(a, b) ? 1 : 6;
+    axes[static_cast<std::size_t>(axis)] = {principal.eigenvectors().col(axis).normalized(),
+                                            std::min(a, b) > kNearlyRound * std::max(a, b)};
+  }
+  return axes;
+}
+
+Eigen::Isometry3d Finisher::turned(const Eigen::Vector3d& axis, double angle_rad) const {
+  const Eigen::Vector3d centroid = centroid_.cast<double>();
+  Eigen::Isometry3d moved = Eigen::Isometry3d::Identity();
+  moved.linear() = Eigen::AngleAxisd(angle_rad, axis).toRotationMatrix();
+  moved.translation() = centroid - moved.linear() * centroid;
+  return moved;
+}
+
+/// Quarter turns about the principal axes; steps of 15 degrees about an axis that the part is nearly round about (a
+/// wheel's spokes are found by the next edge only). None that the symmetry makes another's equal.
+std::vector<Eigen::Matrix3f> Finisher::principal_turns() const {
+  constexpr double kStepRad = std::numbers::pi / 12;
+  std::vector<Eigen::Isometry3d> distinct{Eigen::Isometry3d::Identity()};
+  for (const Principal& principal : principal_axes()) {
+    const int steps = principal.nearly_round ? 1 : 6;
     for (int k = steps; k < 24; k += steps) {
-      Eigen::Isometry3d moved = Eigen::Isometry3d::Identity();
-      moved.linear() =
-          Eigen::AngleAxisd(kStepRad * k, principal.eigenvectors().col(axis).normalized()).toRotationMatrix();
-      moved.translation() = centroid - moved.linear() * centroid;
+      const Eigen::Isometry3d moved = turned(principal.axis, kStepRad * k);
       const bool again = std::any_of(distinct.begin(), distinct.end(), [&](const Eigen::Isometry3d& other) {
         const PoseDistance d = pose_distance(other, moved, part_.symmetry, radius_mm_);
         return d.angle_rad < 0.1 && d.centroid_mm < 0.05 * part_.diameter_mm;
@@ -148,20 +161,86 @@ std::vector<Eigen::Matrix3f> Finisher::principal_turns() const {
   return turns;
 }
 
-Matrix6 Finisher::covariance_of(const Matrix6& information) const {
+void Finisher::weigh_turns(std::vector<Candidate*> candidates) const {
+  constexpr std::array<double, 13> kFanDeg{3, 6, 10, 15, 22, 32, 45, 60, 80, 105, 130, 155, 180};
+  for (const Principal& principal : principal_axes()) {
+    if (!principal.nearly_round) continue;
+    std::vector<double> fan_rad{0};
+    for (const double degrees : kFanDeg)
+      for (const double sign : {-1.0, 1.0}) {
+        const double angle = sign * degrees * std::numbers::pi / 180;
+        // Beyond half of the symmetry's turn it is nearer to the next equal pose.
+        if (pose_distance(Eigen::Isometry3d::Identity(), turned(principal.axis, angle), part_.symmetry, radius_mm_)
+                .angle_rad > 0.99 * std::abs(angle))
+          fan_rad.push_back(angle);
+      }
+    std::sort(fan_rad.begin(), fan_rad.end());
+    if (fan_rad.size() == 1) continue;
+    std::vector<Template> drawn = canvases();
+    share(options_.threads, candidates.size(), deadline_, [&](std::size_t i, int thread) {
+      weigh_turns(*candidates[i], principal.axis, fan_rad, drawn[static_cast<std::size_t>(thread)]);
+    });
+  }
+}
+
+void Finisher::weigh_turns(Candidate& candidate, const Eigen::Vector3d& axis, const std::vector<double>& angles_rad,
+                           Template& drawn) const {
+  /// sd of the evidence over the root of its pixels.
+  constexpr double kEvidenceNoise = 0.5;
+  const auto turned_by = [&](double angle) {
+    const Eigen::Matrix3f R = candidate.pose.R * Eigen::AngleAxisd(angle, axis).toRotationMatrix().cast<float>();
+    return Pose{R, candidate.pose.R * centroid_ + candidate.pose.t - R * centroid_};
+  };
+  struct Turn {
+    double angle_rad, evidence;
+  };
+  std::vector<Turn> fan;
+  const auto look = [&] {
+    fan.clear();
+    for (const double angle : angles_rad) {
+      const Pose pose = turned_by(angle);
+      rasteriser_.draw(pose.R, pose.t, scene_.pixel_mm, scene_.origin_mm, drawn, false);
+      fan.push_back({angle, static_cast<double>(dense_test(scene_, rasteriser_, pose, drawn).evidence)});
+    }
+    return *std::max_element(fan.begin(), fan.end(),
+                             [](const Turn& a, const Turn& b) { return a.evidence < b.evidence; });
+  };
+  Turn best = look();
+  for (int again = 0; again < 2 && best.angle_rad != 0; ++again) {
+    const Candidate other = finished(turned_by(best.angle_rad), drawn);
+    if (other.test.evidence <= candidate.test.evidence) break;
+    candidate.pose = other.pose;
+    candidate.test = other.test;
+    candidate.information = other.information;
+    best = look();
+  }
+  if (best.evidence <= 0) return;
+  double weights = 0, squares = 0;
+  for (std::size_t k = 0; k < fan.size(); ++k) {
+    const double width = fan[std::min(k + 1, fan.size() - 1)].angle_rad - fan[k == 0 ? 0 : k - 1].angle_rad;
+    const double likelihood =
+        width * std::exp((fan[k].evidence - best.evidence) / (kEvidenceNoise * std::sqrt(best.evidence)));
+    weights += likelihood;
+    squares += likelihood * fan[k].angle_rad * fan[k].angle_rad;
+  }
+  candidate.loose_turn_rad += candidate.pose.R.cast<double>() * axis * std::sqrt(squares / weights);
+}
+
+Matrix6 Finisher::covariance_of(const Candidate& candidate) const {
   // Single points are fewer than pixels where holes were filled; the scanner's own error is common to all of them.
   constexpr double kCorrelation = 2.0;
   constexpr double kCommonShare = 0.1;
   Matrix6 prior = Matrix6::Zero();
   prior.diagonal().head<3>().setConstant(1 / std::pow(0.1 * part_.diameter_mm, 2));
   prior.diagonal().tail<3>().setConstant(1 / std::pow(0.3, 2));
-  Matrix6 covariance = (information / kCorrelation + prior).inverse();
+  Matrix6 covariance = (candidate.information / kCorrelation + prior).inverse();
   covariance.diagonal().head<3>().array() += std::pow(kCommonShare * scene_.noise_mm, 2);
+  covariance.bottomRightCorner<3, 3>() += candidate.loose_turn_rad * candidate.loose_turn_rad.transpose();
   return 0.5 * (covariance + covariance.transpose());
 }
 
 float Finisher::looseness_of(const Candidate& candidate) const {
-  const Matrix6 covariance = covariance_of(candidate.information);
+  const Matrix6 covariance = covariance_of(candidate);
   double turn = covariance.bottomRightCorner<3, 3>().trace();
   if (part_.symmetry.kind == Symmetry::Kind::Revolution || part_.symmetry.kind == Symmetry::Kind::RevolutionFlip) {
     const Eigen::Vector3d axis = candidate.pose.R.cast<double>() * part_.symmetry.axis;  // turning about it is nothing

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <optional>
 #include <vector>
 
@@ -32,8 +33,13 @@ class Finisher {
   /// the part's principal axes that are no symmetry: either the turned one is better, or how much worse it is tells
   /// how sure the first one is. Adds what comes near.
   void add_turned(std::vector<Candidate>& candidates, std::size_t strongest, double same_mm) const;
+  /// A part that is nearly round shows how it is turned by little: a wheel by its spokes, which may be hidden, while
+  /// its rim's edges look as if they told. What the picture says of each turn is measured: a better one is taken, and
+  /// Candidate::loose_turn_rad tells how many are as good.
+  void weigh_turns(std::vector<Candidate*> candidates) const;
 
-  Matrix6 covariance_of(const Matrix6& information) const;
+  /// Of (translation mm, rotation rad) about the centroid, supply axes.
+  Matrix6 covariance_of(const Candidate& candidate) const;
   const Rasteriser& rasteriser() const { return rasteriser_; }
   const Eigen::Vector3f& centroid_mm() const { return centroid_; }  ///< Object frame.
   double radius_mm() const { return radius_mm_; }                   ///< Rms distance of the vertices from there.
@@ -41,7 +47,15 @@ class Finisher {
   float edge_gate_px(float pixels, double diameters) const;
 
  private:
+  struct Principal {
+    Eigen::Vector3d axis;  ///< Object frame, through the centroid.
+    bool nearly_round = false;
+  };
+  std::array<Principal, 3> principal_axes() const;
+  Eigen::Isometry3d turned(const Eigen::Vector3d& axis, double angle_rad) const;
   std::vector<Eigen::Matrix3f> principal_turns() const;
+  void weigh_turns(Candidate& candidate, const Eigen::Vector3d& axis, const std::vector<double>& angles_rad,
+                   Template& drawn) const;
   float looseness_of(const Candidate& candidate) const;
   std::vector<Template> canvases() const;
 

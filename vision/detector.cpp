@@ -127,8 +127,12 @@ class Detecting {
     if (with("turned")) finish_.add_turned(candidates, most(kTurnedBest), kSameDiameters * part_.diameter_mm);
     ended("rendered test");
     observed("rendered test", candidates, [](const Candidate& c) { return c.pose.iso(); });
-    report(select(scene_, finish_.rasteriser(), part_.symmetry, std::move(candidates), select_options()));
+    std::vector<Selected> selected =
+        select(scene_, finish_.rasteriser(), part_.symmetry, std::move(candidates), select_options());
     ended("selection");
+    weigh_turns(selected);
+    ended("rendered test");
+    report(selected);
     observed("selection", report_.detections, [](const Detection& d) { return d.T_supply_object.iso; });
     report_.time_ms = milliseconds_since(start_);
     spare_scene() = std::move(scene_);
@@ -398,8 +402,7 @@ class Detecting {
       for (std::size_t k = 0; k < kept.size() && !again; ++k) {
         const float apart = (centres[k] - centre).norm();
         near += apart < crowd_mm;
-        again = apart < same_mm && displacement_mm({kept[k].pose, {}, {}, {}}, {h.pose, {}, {}, {}}, part_.symmetry,
-                                                   finish_.radius_mm()) < same_mm;
+        again = apart < same_mm && displacement_mm(kept[k].pose, h.pose, part_.symmetry, finish_.radius_mm()) < same_mm;
       }
       if (again || near >= crowd) continue;
       kept.push_back(h);
@@ -530,6 +533,13 @@ class Detecting {
     return {};
   }
 
+  void weigh_turns(std::vector<Selected>& selected) const {
+    std::vector<Candidate*> believed;
+    for (Selected& entry : selected)
+      if (entry.reason.empty() && entry.score >= kScoreMin) believed.push_back(&entry.candidate);
+    finish_.weigh_turns(believed);
+  }
+
   void report(const std::vector<Selected>& selected) {
     const auto rejections = static_cast<std::size_t>(std::max(0, options_.rejections_max));
     for (const Selected& entry : selected) {
@@ -541,7 +551,7 @@ class Detecting {
         detection.score = entry.score;
         detection.evidence = entry.candidate.evidence;
         detection.visible_fraction = entry.candidate.test.visible_fraction();
-        detection.covariance = finish_.covariance_of(entry.candidate.information);
+        detection.covariance = finish_.covariance_of(entry.candidate);
         report_.detections.push_back(detection);
       } else if (report_.rejected.size() < rejections && (reason != entry.reason || !entry.overshadowed)) {
         report_.rejected.push_back({T, entry.score, entry.candidate.evidence, reason});

@@ -1,5 +1,6 @@
 #include "vision/grasp.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,8 +12,9 @@ namespace binpick::vision {
 namespace {
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kRevolutionStep = 15 * kDegree;
-/// Beliefs closer than this are equal; then the higher object goes first, as nothing lies on it.
-constexpr double kScoreStep = 0.02;
+/// Probabilities closer than this are equal; then the higher object goes first, as nothing lies on it.
+constexpr double kProbabilityStep = 0.02;
+constexpr double kHoldsMm = 3, kHoldsRad = 3 * kDegree;
 /// Makes millimetres outside a wall and radians over the tilt limit comparable, to name the least bad grasp.
 constexpr double kMillimetresPerRadian = 200.0;
 
@@ -74,7 +76,25 @@ Obstacle obstacle(const Eigen::Isometry3d& T_supply_tcp, double tilt_rad, const 
   }
   return worst;
 }
+
+/// Of a normal error, in the direction in which it is largest.
+double within(double limit, const Eigen::Matrix3d& covariance) {
+  const double variance =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>{covariance, Eigen::EigenvaluesOnly}.eigenvalues().maxCoeff();
+  return variance > 0 ? std::erf(limit / std::sqrt(2 * variance)) : 1;
+}
 }  // namespace
+
+double probability_of_holding(const Detection& detection, const Symmetry& symmetry) {
+  Eigen::Matrix3d turn = detection.covariance.bottomRightCorner<3, 3>();
+  if (symmetry.kind == Symmetry::Kind::Revolution || symmetry.kind == Symmetry::Kind::RevolutionFlip) {
+    const Eigen::Vector3d axis = detection.T_supply_object.iso.linear() * symmetry.axis;
+    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - axis * axis.transpose();
+    turn = across * turn * across;
+  }
+  if (symmetry.kind == Symmetry::Kind::Sphere) turn.setZero();
+  return detection.score * within(kHoldsMm, detection.covariance.topLeftCorner<3, 3>()) * within(kHoldsRad, turn);
+}
 
 GraspChoice choose_grasps(const DetectionReport& report, const Symmetry& symmetry, const std::vector<Grasp>& grasps,
                           const SupplyBox& supply, const ReachLimits& limits) {
@@ -105,11 +125,11 @@ GraspChoice choose_grasps(const DetectionReport& report, const Symmetry& symmetr
     else
       choice.unreachable.push_back({d, least.reason});
   }
-  const auto belief = [&](const Reachable& r) {
-    return std::lround(report.detections[r.detection].score / kScoreStep);
-  };
+  std::vector<long> holds;
+  for (const Detection& d : report.detections)
+    holds.push_back(std::lround(probability_of_holding(d, symmetry) / kProbabilityStep));
   std::stable_sort(choice.reachable.begin(), choice.reachable.end(), [&](const Reachable& a, const Reachable& b) {
-    if (belief(a) != belief(b)) return belief(a) > belief(b);
+    if (holds[a.detection] != holds[b.detection]) return holds[a.detection] > holds[b.detection];
     return a.T_supply_grasp.iso.translation().z() > b.T_supply_grasp.iso.translation().z();
   });
   return choice;

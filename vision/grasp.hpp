@@ -20,6 +20,11 @@ struct ReachLimits {
   double wall_clearance_mm = 0;  ///< The tcp stays this far inside the supply's walls.
 };
 
+/// Probability that a detection is right and lies so near to the truth that a grasp holds: its score, times what its
+/// covariance leaves within 3 mm and 3 degrees in the worst direction. A turn that the symmetry makes nothing of does
+/// not count. A wheel whose spokes are hidden is surely a wheel, and yet not the one to pick first.
+double probability_of_holding(const Detection& detection, const Symmetry& symmetry);
+
 struct Reachable {
   std::size_t detection = 0;  ///< Index in the report.
   std::size_t grasp = 0;
@@ -31,7 +36,7 @@ struct Unreachable {
   std::string reason;  ///< "tilt 51 deg is over 40 deg", "tcp 12 mm outside the wall x max".
 };
 struct GraspChoice {
-  /// At most one per detection, its steepest; best first: believed most (in steps of 0.02), then highest.
+  /// At most one per detection, its steepest; best first: the surest to hold (in steps of 0.02), then the highest.
   std::vector<Reachable> reachable;
   std::vector<Unreachable>
       unreachable;  ///< Detections without any reachable grasp, with the reason of the least bad one.

@@ -98,7 +98,7 @@ class Selecting {
 
   bool same(std::size_t a, std::size_t b) const {
     return (centres_[a] - centres_[b]).norm() < static_cast<float>(options_.same_mm) &&
-           displacement_mm(candidates_[a], candidates_[b], symmetry_, options_.radius_mm) < options_.same_mm;
+           displacement_mm(candidates_[a].pose, candidates_[b].pose, symmetry_, options_.radius_mm) < options_.same_mm;
   }
 
   /// Two bodies have no centre in common: one glance at the centres tells that this is another pose of the same object.
@@ -214,8 +214,8 @@ class Selecting {
 };
 }  // namespace
 
-double displacement_mm(const Candidate& a, const Candidate& b, const Symmetry& symmetry, double radius_mm) {
-  const PoseDistance distance = pose_distance(a.pose.iso(), b.pose.iso(), symmetry, radius_mm);
+double displacement_mm(const Pose& a, const Pose& b, const Symmetry& symmetry, double radius_mm) {
+  const PoseDistance distance = pose_distance(a.iso(), b.iso(), symmetry, radius_mm);
   const double turn = 2 * std::sin(0.5 * distance.angle_rad) * radius_mm;
   return std::hypot(distance.centroid_mm, std::sqrt(2.0 / 3.0) * turn);
 }

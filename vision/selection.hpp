@@ -14,7 +14,8 @@ struct Candidate {
   Pose pose;
   DenseTest test;
   Matrix6 information = Matrix6::Zero();
-  Evidence evidence;  ///< Without Clue::Claimed and Clue::Rival before select().
+  Eigen::Vector3d loose_turn_rad = Eigen::Vector3d::Zero();  ///< One sd more of a turn that the picture hardly tells.
+  Evidence evidence;                                         ///< Without Clue::Claimed and Clue::Rival before select().
 };
 
 struct SelectOptions {
@@ -43,5 +44,5 @@ std::vector<Selected> select(const Scene& scene, const Rasteriser& part, const S
                              std::vector<Candidate> candidates, const SelectOptions& options);
 
 /// Surface displacement (rms, mm) that the distance of two poses stands for.
-double displacement_mm(const Candidate& a, const Candidate& b, const Symmetry& symmetry, double radius_mm);
+double displacement_mm(const Pose& a, const Pose& b, const Symmetry& symmetry, double radius_mm);
 }  // namespace binpick::vision

@@ -1,5 +1,6 @@
 #include "vision/grasp.hpp"
 
+#include <cmath>
 #include <gtest/gtest.h>
 #include <numbers>
 
@@ -95,7 +96,7 @@ TEST(Grasp, AFiniteSymmetryTurnsAboutItsCentre) {
   EXPECT_NEAR(choice.reachable[0].T_supply_grasp.iso.translation().z(), 35, 1e-9);
 }
 
-TEST(Grasp, BelievedMostThenHighest) {
+TEST(Grasp, TheSurestToHoldThenTheHighest) {
   DetectionReport report;
   report.detections = {lying_at(0, 0, 30, 0.962), lying_at(0, 200, 90, 0.955), lying_at(200, 0, 300, 0.7)};
   const GraspChoice choice = choose_grasps(report, {}, {from_above()}, kSupply, {});
@@ -103,6 +104,27 @@ TEST(Grasp, BelievedMostThenHighest) {
   EXPECT_EQ(choice.reachable[0].detection, 1U);
   EXPECT_EQ(choice.reachable[1].detection, 0U);
   EXPECT_EQ(choice.reachable[2].detection, 2U);
+}
+
+// A wheel on top of all, sure to be there, but nobody saw its spokes.
+TEST(Grasp, APoseThatIsNotKnownWellEnoughWaits) {
+  DetectionReport report;
+  report.detections = {lying_at(0, 0, 300, 0.99), lying_at(0, 200, 90, 0.9)};
+  Symmetry symmetry;
+  EXPECT_NEAR(probability_of_holding(report.detections[0], symmetry), 0.99, 1e-3);
+  const double sd_rad = 10 * kPi / 180;
+  report.detections[0].covariance(5, 5) = sd_rad * sd_rad;
+  EXPECT_NEAR(probability_of_holding(report.detections[0], symmetry), 0.99 * std::erf(0.3 / std::sqrt(2)), 1e-3);
+  EXPECT_EQ(choose_grasps(report, symmetry, {from_above()}, kSupply, {}).reachable[0].detection, 1U);
+  // Nothing can be wrong about how a round part is turned.
+  symmetry.kind = Symmetry::Kind::Revolution;
+  symmetry.axis = Eigen::Vector3d::UnitZ();
+  EXPECT_NEAR(probability_of_holding(report.detections[0], symmetry), 0.99, 1e-3);
+  EXPECT_EQ(choose_grasps(report, symmetry, {from_above()}, kSupply, {}).reachable[0].detection, 0U);
+  symmetry.axis = Eigen::Vector3d::UnitX();
+  EXPECT_LT(probability_of_holding(report.detections[0], symmetry), 0.3);
+  report.detections[1].covariance.topLeftCorner<3, 3>() = 9 * Eigen::Matrix3d::Identity();
+  EXPECT_NEAR(probability_of_holding(report.detections[1], symmetry), 0.9 * 0.683, 1e-3);
 }
 
 TEST(Grasp, NoGraspIsAReason) {

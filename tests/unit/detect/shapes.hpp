@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
 
 #include "vision/mesh.hpp"
@@ -29,6 +30,26 @@ inline Mesh bracket() {
   add_box(mesh, {-80, -45, 0}, {80, 45, 22});
   add_box(mesh, {-80, -45, 22}, {-52, 45, 70});
   add_box(mesh, {40, -45, 22}, {80, -10, 44});
+  return mesh;
+}
+
+/// A round plate, 180 mm across, that shows how it is turned by one ridge on its top.
+inline Mesh dial() {
+  Mesh mesh;
+  constexpr std::uint32_t kCorners = 32;
+  for (const float z : {0.0F, 24.0F})
+    for (std::uint32_t k = 0; k < kCorners; ++k) {
+      const float angle = 2 * std::numbers::pi_v<float> * static_cast<float>(k) / kCorners;
+      mesh.vertices_mm.emplace_back(90 * std::cos(angle), 90 * std::sin(angle), z);
+    }
+  for (std::uint32_t k = 0; k < kCorners; ++k) {
+    const std::uint32_t next = (k + 1) % kCorners;
+    mesh.triangles.push_back({k, next, kCorners + next});
+    mesh.triangles.push_back({k, kCorners + next, kCorners + k});
+    mesh.triangles.push_back({0, next, k});
+    mesh.triangles.push_back({kCorners, kCorners + k, kCorners + next});
+  }
+  add_box(mesh, {30, -10, 24}, {84, 10, 42});
   return mesh;
 }
 
