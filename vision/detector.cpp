@@ -6,14 +6,15 @@
 #include <limits>
 #include <map>
 #include <mutex>
-#include <unordered_map>
 #include <utility>
 
 #include "base/check.hpp"
+#include "vision/bounds.hpp"
 #include "vision/candidates.hpp"
 #include "vision/exhaustive.hpp"
 #include "vision/feature.hpp"
 #include "vision/maxima.hpp"
+#include "vision/narrowing.hpp"
 #include "vision/voting.hpp"
 
 namespace binpick::vision {
@@ -23,15 +24,10 @@ using SteadyClock = std::chrono::steady_clock;
 /// How many hypotheses of a pass survive each stage. Thousands are cheap to test and dear to lose; only distinct
 /// survivors pay for a rendered test.
 constexpr double kSparseBest = 2000, kNudgedBest = 600, kDistinctBest = 300, kRenderedBest = 100, kTurnedBest = 16;
-/// Two of them are one if their centres and rotations are no further apart than this.
-constexpr double kThinDiameters = 0.06, kThinGaps = 2.0;
-/// Samples of the first steps of refinement.
-constexpr std::size_t kQuickSurface = 64, kQuickEdges = 24, kAll = 1000;
 /// So many of each maximum stay, whatever those of others are worth.
 constexpr std::size_t kOfEachMaximum = 6;
 /// So many poses of one place are enough: a well-seen object must not crowd out the others.
 constexpr std::size_t kCrowdMax = 10, kRenderedCrowdMax = 3;
-constexpr double kCrowdDiameters = 0.15;
 /// What explains less of its silhouette at the first look is not refined: strict where there is a second pass.
 constexpr float kFirstLookShare = 0.05F, kLastLookShare = -0.2F;
 /// A place is settled by a pose this sure; what explains less than this share of what it does is not looked at again.
@@ -42,7 +38,6 @@ constexpr double kSparseToleranceDiameters = 0.035;
 /// much: a narrower gate silently loses what lies flat on the floor.
 constexpr double kFloorGateDiameters = 0.12;
 constexpr double kUsualGapRad = 0.0988;  ///< Of a grid of 10 000, on average.
-constexpr double kWallGateDiameters = 0.04;
 constexpr double kSameDiameters = 0.12;
 /// The first pass tries maxima this far apart; most objects are found at one of them.
 constexpr double kFirstApartDiameters = 0.15;
@@ -60,33 +55,6 @@ Scene& spare_scene() {
   return spare;
 }
 
-/// Supply's floor: known, or found as the level below which there is nothing and on which much lies, or unknown.
-float floor_of(const Scene& scene, const SupplyBox& supply) {
-  constexpr float kUnknown = -std::numeric_limits<float>::infinity();
-  if (supply.size_mm.x() > 0 && supply.size_mm.y() > 0) return 0;
-  std::vector<float> heights;
-  for (const float z : scene.z_mm.reshaped<Eigen::RowMajor>())
-    if (!std::isnan(z)) heights.push_back(z);
-  if (heights.empty()) return kUnknown;
-  const auto low = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 50);
-  std::nth_element(heights.begin(), low, heights.end());
-  const float band = 3 * static_cast<float>(scene.noise_mm);
-  double sum = 0;
-  std::size_t n = 0;
-  for (const float z : heights)
-    if (std::abs(z - *low) <= band) sum += z, ++n;
-  return n * 5 >= heights.size() ? static_cast<float>(sum / static_cast<double>(n)) : kUnknown;
-}
-
-struct Hypothesis {
-  std::uint32_t maximum = 0;
-  std::uint16_t view = 0;
-  Pose pose;
-  float evidence = 0;
-};
-
-bool stronger(const Hypothesis& a, const Hypothesis& b) { return a.evidence > b.evidence; }
-
 /// One detection under way: what all stages share.
 class Detecting {
  public:
@@ -98,6 +66,7 @@ class Detecting {
         part_{base.impl()},
         options_{options},
         finish_{scene_, part_, deadline_, {options.threads, with("edges"), with("second refinement")}},
+        narrow_{scene_, part_, finish_, deadline_, options.threads, with("edges")},
         centroid_{finish_.centroid_mm()} {
     noise_mm_ = std::max(options.noise_mm.value_or(part_.noise_mm), 1e-3);
   }
@@ -105,9 +74,9 @@ class Detecting {
   DetectionReport run() {
     stage_start_ = SteadyClock::now();
     scene_ = prepare_scene(image_, noise_mm_, options_.threads, kernels::table(), std::exchange(spare_scene(), {}));
-    floor_mm_ = floor_of(scene_, supply_);
-    lowest_allowed_mm_ =
-        static_cast<float>(floor_mm_ - std::max(3 * noise_mm_, kFloorGateDiameters * coarseness() * part_.diameter_mm));
+    bounds_.emplace(scene_, supply_, part_.diameter_mm);
+    lowest_allowed_mm_ = static_cast<float>(
+        bounds_->floor_mm() - std::max(3 * noise_mm_, kFloorGateDiameters * coarseness() * part_.diameter_mm));
     finish_.begin();
     ended("surface");
     const std::vector<Eigen::Vector3f> maxima = anchors();
@@ -157,13 +126,13 @@ class Detecting {
     }
     ended("sparse test");
     remember("sparse test", hypotheses, [](const Hypothesis& h) { return h.pose.iso(); });
-    hypotheses = thinned(std::move(hypotheses));
-    nudge(hypotheses);
-    hypotheses = distinct(std::move(hypotheses), most(kDistinctBest), kCrowdMax);
+    hypotheses = narrow_.thinned(std::move(hypotheses));
+    narrow_.nudge(hypotheses, most(kNudgedBest));
+    hypotheses = narrow_.distinct(std::move(hypotheses), most(kDistinctBest), kCrowdMax);
     ended("first refinement");
     remember("first refinement", hypotheses, [](const Hypothesis& h) { return h.pose.iso(); });
-    if (with("first look")) look_at(hypotheses, look_share);
-    hypotheses = distinct(std::move(hypotheses), most(kRenderedBest), kRenderedCrowdMax);
+    if (with("first look")) narrow_.look_at(hypotheses, look_share);
+    hypotheses = narrow_.distinct(std::move(hypotheses), most(kRenderedBest), kRenderedCrowdMax);
     ended("first look");
     remember("first look", hypotheses, [](const Hypothesis& h) { return h.pose.iso(); });
     render(hypotheses, candidates);
@@ -247,7 +216,7 @@ class Detecting {
     float rise = std::numeric_limits<float>::max();
     for (const View& view : part_.views) rise = std::min(rise, -view.lowest_mm);
     const auto gate = static_cast<float>(std::max(2 * noise_mm_, 0.03 * part_.diameter_mm));
-    maxima.z_min_mm = part_.views.empty() ? floor_mm_ : floor_mm_ + std::max(0.5F * rise, rise - gate);
+    maxima.z_min_mm = bounds_->floor_mm() + std::max(0.5F * rise, rise - gate);
     return find_maxima(scene_, maxima);
   }
 
@@ -321,117 +290,9 @@ class Detecting {
     return hypotheses;
   }
 
-  /// Of those that start from nearly the same pose the strongest: refinement would make them one.
-  std::vector<Hypothesis> thinned(std::vector<Hypothesis> hypotheses) const {
-    std::stable_sort(hypotheses.begin(), hypotheses.end(), stronger);
-    const auto cell_mm = static_cast<float>(kThinDiameters * part_.diameter_mm);
-    const auto same_turn = static_cast<float>(std::cos(0.5 * kThinGaps * part_.rotation_gap_rad));
-    struct Kept {
-      Eigen::Vector3f centre;
-      Eigen::Quaternionf turn;
-    };
-    std::unordered_map<std::uint64_t, std::vector<Kept>> cells;
-    const auto key_of = [](const Eigen::Array3i& cell) {
-      constexpr std::uint64_t kBits = 21, kMask = (1U << kBits) - 1;
-      const Eigen::Array<std::uint64_t, 3, 1> bits = (cell + (1 << (kBits - 1))).cast<std::uint64_t>();
-      return (bits.x() & kMask) << (2 * kBits) | (bits.y() & kMask) << kBits | (bits.z() & kMask);
-    };
-    std::vector<Hypothesis> kept;
-    for (Hypothesis& h : hypotheses) {
-      const Eigen::Vector3f centre = h.pose.R * centroid_ + h.pose.t;
-      const Eigen::Quaternionf& turn = part_.views[h.view].R_supply_object;
-      const Eigen::Array3i cell = (centre / cell_mm).array().floor().cast<int>();
-      bool again = false;
-      for (int k = 0; k < 27 && !again; ++k) {
-        const auto it = cells.find(key_of(cell + Eigen::Array3i(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1)));
-        if (it == cells.end()) continue;
-        again = std::any_of(it->second.begin(), it->second.end(), [&](const Kept& other) {
-          return std::abs(other.turn.dot(turn)) > same_turn && (other.centre - centre).norm() < cell_mm;
-        });
-      }
-      if (again) continue;
-      cells[key_of(cell)].push_back({centre, turn});
-      kept.push_back(std::move(h));
-    }
-    return kept;
-  }
-
-  /// Refinement on the view's own samples: two steps on few of them for all, then, for the best, some more on all;
-  /// each time the sparse test again, more strictly.
-  void nudge(std::vector<Hypothesis>& hypotheses) const {
-    const float tolerance = tolerance_of(scene_);
-    RefineOptions options;
-    options.gate_from_mm = std::max(3 * tolerance, static_cast<float>(0.06 * part_.diameter_mm));
-    options.gate_to_mm = std::max(2 * tolerance, static_cast<float>(0.03 * part_.diameter_mm));
-    options.edge_gate_from_px = finish_.edge_gate_px(6, 0.08);
-    options.edge_gate_to_px = finish_.edge_gate_px(3, 0.03);
-    const float edge_gate_to_px = options.edge_gate_to_px, gate_to_mm = options.gate_to_mm;
-    const auto refine_all = [&](std::size_t surface_max, std::size_t edges_max, float evidence_mm) {
-      share(options_.threads, hypotheses.size(), deadline_, [&](std::size_t i, int) {
-        Hypothesis& h = hypotheses[i];
-        refine(scene_, model_points(part_.views[h.view], h.pose, surface_max, edges_max),
-               h.pose.R * centroid_ + h.pose.t, options, h.pose);
-        h.evidence = sparse_evidence(scene_, part_, h.view, h.pose, evidence_mm, surface_max);
-      });
-    };
-    options.steps = 2;
-    options.gate_to_mm = 0.5F * (options.gate_from_mm + gate_to_mm);
-    options.edge_gate_to_px = 0.5F * (options.edge_gate_from_px + edge_gate_to_px);
-    refine_all(kQuickSurface, with("edges") ? kQuickEdges : 0, 3 * tolerance);
-    std::stable_sort(hypotheses.begin(), hypotheses.end(), stronger);
-    if (hypotheses.size() > most(kNudgedBest))
-      hypotheses.erase(hypotheses.begin() + static_cast<std::ptrdiff_t>(most(kNudgedBest)), hypotheses.end());
-    options.steps = 3;
-    options.gate_from_mm = options.gate_to_mm;
-    options.edge_gate_from_px = options.edge_gate_to_px;
-    options.gate_to_mm = gate_to_mm;
-    options.edge_gate_to_px = edge_gate_to_px;
-    refine_all(kAll, with("edges") ? kAll : 0, 2 * tolerance);
-  }
-
-  std::vector<Hypothesis> distinct(std::vector<Hypothesis> hypotheses, std::size_t most, std::size_t crowd) const {
-    std::stable_sort(hypotheses.begin(), hypotheses.end(), stronger);
-    const double same_mm = 0.04 * part_.diameter_mm, crowd_mm = kCrowdDiameters * part_.diameter_mm;
-    std::vector<Hypothesis> kept;
-    std::vector<Eigen::Vector3f> centres;
-    for (const Hypothesis& h : hypotheses) {
-      if (kept.size() >= most || h.evidence <= 0) break;
-      const Eigen::Vector3f centre = h.pose.R * centroid_ + h.pose.t;
-      bool again = false;
-      std::size_t near = 0;
-      for (std::size_t k = 0; k < kept.size() && !again; ++k) {
-        const float apart = (centres[k] - centre).norm();
-        near += apart < crowd_mm;
-        again = apart < same_mm && displacement_mm(kept[k].pose, h.pose, part_.symmetry, finish_.radius_mm()) < same_mm;
-      }
-      if (again || near >= crowd) continue;
-      kept.push_back(h);
-      centres.push_back(centre);
-    }
-    return kept;
-  }
-
-  /// Drops what explains less of its silhouette than `share` (below zero: what is contradicted by more).
-  void look_at(std::vector<Hypothesis>& hypotheses, float share) const {
-    constexpr float kTrace = 0.001F;
-    std::vector<Pose> poses;
-    for (const Hypothesis& h : hypotheses) poses.push_back(h.pose);
-    const std::vector<float> seen = finish_.looked_at(poses);
-    std::vector<Hypothesis> kept;
-    for (std::size_t i = 0; i < hypotheses.size(); ++i) {
-      Hypothesis& h = hypotheses[i];
-      if (seen[i] < share * part_.views[h.view].area_mm2 / static_cast<float>(scene_.pixel_mm * scene_.pixel_mm))
-        continue;
-      // Refinement may mend what is more contradicted than explained: it comes last, but in its order.
-      h.evidence = seen[i] > kTrace ? seen[i] : kTrace / (1 + kTrace - seen[i]);
-      kept.push_back(h);
-    }
-    hypotheses = std::move(kept);
-  }
-
   /// The best of each place first; the others of a place only where that did not settle it.
   void render(const std::vector<Hypothesis>& hypotheses, std::vector<Candidate>& candidates) {
-    const auto place_mm = static_cast<float>(kCrowdDiameters * part_.diameter_mm);
+    const float place_mm = narrow_.place_mm();
     std::vector<std::size_t> leaders, others, leader_of(hypotheses.size());
     std::vector<Eigen::Vector3f> centres;
     for (std::size_t i = 0; i < hypotheses.size(); ++i) {
@@ -461,7 +322,7 @@ class Detecting {
     share(options_.threads, which.size(), deadline_, [&](std::size_t k, int thread) {
       Candidate& candidate = made[which[k]];
       candidate = finish_.finished(hypotheses[which[k]].pose, drawn[static_cast<std::size_t>(thread)]);
-      if (score_of(candidate.evidence) < kValidScore || !outside(candidate.pose).empty()) return;
+      if (score_of(candidate.evidence) < kValidScore || !against(candidate.pose).empty()) return;
       const std::scoped_lock lock{first_valid};
       if (!report_.first)
         report_.first = FirstValid{{candidate.pose.iso()}, milliseconds_since(start_), rendered_ + k + 1};
@@ -471,11 +332,11 @@ class Detecting {
 
   /// Pixels that a valid pose explains. Of poses that are close together the strongest only is looked at.
   Grid<std::uint8_t> explained_by(const std::vector<Candidate>& candidates) const {
-    const auto place_mm = static_cast<float>(kCrowdDiameters * part_.diameter_mm);
+    const float place_mm = narrow_.place_mm();
     std::vector<const Candidate*> standing;
     std::vector<Eigen::Vector3f> centres;
     for (const Candidate& c : candidates) {
-      if (score_of(c.evidence) < kValidScore || !outside(c.pose).empty()) continue;
+      if (score_of(c.evidence) < kValidScore || !against(c.pose).empty()) continue;
       const Eigen::Vector3f centre = c.pose.R * centroid_ + c.pose.t;
       if (std::any_of(centres.begin(), centres.end(),
                       [&](const Eigen::Vector3f& other) { return (other - centre).norm() < place_mm; }))
@@ -509,29 +370,14 @@ class Detecting {
     options.centroid_mm = centroid_;
     options.threads = options_.threads;
     options.score_min = kScoreMin;
-    options.outside = [this](const Pose& pose) { return outside(pose); };
+    options.outside = [this](const Pose& pose) { return against(pose); };
     options.rooms = with("rooms");
     options.explain_away = with("explain away");
     return options;
   }
 
-  /// Floor and walls at the refined pose, by every vertex.
-  std::string outside(const Pose& pose) const {
-    const double depth = std::max(3 * noise_mm_, 0.03 * part_.diameter_mm);
-    const double wall = kWallGateDiameters * part_.diameter_mm + 2 * scene_.pixel_mm;
-    float lowest = std::numeric_limits<float>::max();
-    Eigen::Vector2f reach = Eigen::Vector2f::Zero();
-    for (const Eigen::Vector3f& v : part_.mesh.vertices_mm) {
-      const Eigen::Vector3f p = pose.R * v + pose.t;
-      lowest = std::min(lowest, p.z());
-      reach = reach.cwiseMax(p.head<2>().cwiseAbs());
-    }
-    if (lowest < floor_mm_ - depth) return "reaches through the floor";
-    if (supply_.size_mm.x() > 0 && supply_.size_mm.y() > 0 &&
-        (reach.x() > 0.5 * supply_.size_mm.x() + wall || reach.y() > 0.5 * supply_.size_mm.y() + wall))
-      return "reaches through a wall";
-    return {};
-  }
+  /// Why the part cannot be there; empty: it can.
+  std::string against(const Pose& pose) const { return bounds_->against(pose, part_.mesh.vertices_mm); }
 
   void weigh_turns(std::vector<Selected>& selected) const {
     std::vector<Candidate*> believed;
@@ -573,9 +419,11 @@ class Detecting {
   const DetectorOptions& options_;
   Scene scene_;  // before what refers to it
   Finisher finish_;
+  Narrowing narrow_;
+  std::optional<Bounds> bounds_;
   Eigen::Vector3f centroid_;
   double noise_mm_ = 1;
-  float floor_mm_ = 0, lowest_allowed_mm_ = 0;
+  float lowest_allowed_mm_ = 0;
   std::size_t rendered_ = 0;
   std::optional<ExhaustiveSearch> search_;
   std::vector<std::pair<std::string_view, std::vector<Transform<frame::Supply, frame::Object>>>> alive_;

@@ -1,0 +1,52 @@
+#include "vision/bounds.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace binpick::vision {
+namespace {
+constexpr double kFloorGateDiameters = 0.03, kWallGateDiameters = 0.04;
+
+bool has_walls(const SupplyBox& supply) { return supply.size_mm.x() > 0 && supply.size_mm.y() > 0; }
+
+float floor_of(const Scene& scene, const SupplyBox& supply) {
+  constexpr float kUnknown = -std::numeric_limits<float>::infinity();
+  if (has_walls(supply)) return 0;
+  std::vector<float> heights;
+  for (const float z : scene.z_mm.reshaped<Eigen::RowMajor>())
+    if (!std::isnan(z)) heights.push_back(z);
+  if (heights.empty()) return kUnknown;
+  const auto low = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 50);
+  std::nth_element(heights.begin(), low, heights.end());
+  const float band = 3 * static_cast<float>(scene.noise_mm);
+  double sum = 0;
+  std::size_t n = 0;
+  for (const float z : heights)
+    if (std::abs(z - *low) <= band) sum += z, ++n;
+  return n * 5 >= heights.size() ? static_cast<float>(sum / static_cast<double>(n)) : kUnknown;
+}
+}  // namespace
+
+Bounds::Bounds(const Scene& scene, const SupplyBox& supply, double diameter_mm)
+    : floor_mm_{floor_of(scene, supply)},
+      depth_mm_{static_cast<float>(std::max(3 * scene.noise_mm, kFloorGateDiameters * diameter_mm))},
+      walls_mm_{Eigen::Array2f::Constant(std::numeric_limits<float>::infinity())} {
+  if (has_walls(supply))
+    walls_mm_ =
+        (0.5 * supply.size_mm.head<2>().array() + kWallGateDiameters * diameter_mm + 2 * scene.pixel_mm).cast<float>();
+}
+
+std::string Bounds::against(const Pose& pose, const std::vector<Eigen::Vector3f>& vertices_mm) const {
+  float lowest = std::numeric_limits<float>::max();
+  Eigen::Array2f reach = Eigen::Array2f::Zero();
+  for (const Eigen::Vector3f& v : vertices_mm) {
+    const Eigen::Vector3f p = pose.R * v + pose.t;
+    lowest = std::min(lowest, p.z());
+    reach = reach.max(p.head<2>().array().abs());
+  }
+  if (lowest < floor_mm_ - depth_mm_) return "reaches through the floor";
+  if ((reach > walls_mm_).any()) return "reaches through a wall";
+  return {};
+}
+}  // namespace binpick::vision

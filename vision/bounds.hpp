@@ -1,0 +1,27 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "vision/detector.hpp"
+#include "vision/verification.hpp"
+
+/// Where no part can be: below the floor, outside the walls.
+namespace binpick::vision {
+class Bounds {
+ public:
+  /// The floor is the supply's, or, where that is not known, the level below which there is nothing and on which much
+  /// lies; or there is none.
+  Bounds(const Scene& scene, const SupplyBox& supply, double diameter_mm);
+
+  float floor_mm() const { return floor_mm_; }  ///< Minus infinity: none.
+  /// Why a part cannot be there, by every vertex (object frame); empty: it can.
+  std::string against(const Pose& pose, const std::vector<Eigen::Vector3f>& vertices_mm) const;
+
+ private:
+  float floor_mm_;
+  float depth_mm_;           ///< So much through the floor is error of the pose.
+  Eigen::Array2f walls_mm_;  ///< Half of the supply, and what is error of the pose; infinity: no walls.
+};
+}  // namespace binpick::vision
