@@ -51,7 +51,7 @@ void alarms(const RunOptions& options, const RunSelection& selection, std::size_
       if (!alarm.empty()) poses = taken_down(settled_pile(alarm.there, alarm.id.pile, options.piles), alarm.id.fill);
       Scene scene = make_scene(alarm.there, poses, alarm.id, options.bias_mm);
       scene.truths.clear();  // they are other parts'
-      detect_scene(scene, part.judge(), part.base(), options.detector(), line);
+      detect_scene(scene, part.judge(), part.base(), options.detector(), line, options.picture_folder());
       AlarmCount own;
       own.add(line);
       std::printf("%s: %s; %d above .5, highest %.2f\n", line.key().c_str(), kAlarmKinds[alarm.kind].data(),

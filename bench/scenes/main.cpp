@@ -67,6 +67,7 @@ void add_run_options(CLI::App& command, RunOptions& options) {
   command.add_option("--bias-mm", options.bias_mm, "LMS 400: bias of each material, within plus and minus this");
   command.add_option("--sparse", options.sparse, "points farther apart than the class's, by this factor (run)")
       ->check(CLI::Range(1.0, 4.0));
+  command.add_flag("--pictures", options.pictures, "draw what was found in each scene into OUT/pictures");
   command.add_option("--ablate", options.without, "leave this addition out; may be given several times")
       ->check(CLI::IsMember(additions()));
 }

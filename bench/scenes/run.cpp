@@ -16,6 +16,7 @@
 #include "bench/scenes/run_file.hpp"
 #include "bench/scenes/scanners.hpp"
 #include "bench/scenes/stage_recall.hpp"
+#include "vision/draw.hpp"
 #include "vision/kernels.hpp"
 
 namespace binpick::bench {
@@ -59,7 +60,7 @@ class PartRun {
         for (const Truth& t : scene.truths) line.truths.push_back({t.T_supply_object.iso, t.visible, t.told});
         peer_->detect(scene.points, line);
       } else {
-        detect_scene(scene, judge_, base_, contender->options, line);
+        detect_scene(scene, judge_, base_, contender->options, line, options_.picture_folder());
       }
       if (contender->memory && number == 0)
         line.memory_mib = memory_mib(scene, base_file_, contender->options, options_.out);
@@ -102,6 +103,8 @@ RunHeader RunOptions::header() const {
 std::string RunOptions::base_file(const ScenePart& part) const {
   return (bases.empty() ? out + "/bases" : bases) + "/" + setting_of(part).name.data() + "-" + part.body.name + ".kb";
 }
+
+std::string RunOptions::picture_folder() const { return pictures ? out + "/pictures" : std::string{}; }
 
 vision::DetectorOptions RunOptions::detector() const {
   vision::DetectorOptions detector;
@@ -158,7 +161,7 @@ vision::DepthImage depth_image_of(const std::vector<Eigen::Vector3f>& points, co
 }
 
 void detect_scene(const Scene& scene, const Judge& judge, const vision::KnowledgeBase& base,
-                  vision::DetectorOptions options, SceneLine& line) {
+                  vision::DetectorOptions options, SceneLine& line, const std::string& pictures) {
   StageRecall recall{judge, scene.truths, base};
   options.observer = [&](const vision::StageSurvivors& alive) { recall(alive); };
   const auto begin = SteadyClock::now();
@@ -167,6 +170,13 @@ void detect_scene(const Scene& scene, const Judge& judge, const vision::Knowledg
   line.image_ms = ms_since(begin);
   const vision::DetectionReport report = vision::detect(image, supply, base, options);
 
+  if (!pictures.empty()) {
+    fs::create_directories(pictures);
+    std::string name = line.key();
+    std::ranges::replace(name, ' ', '-');
+    if (const auto drawn = vision::draw_report(pictures + "/" + name + ".png", image, base, report); !drawn)
+      throw std::runtime_error{drawn.error()};
+  }
   line.time_ms = line.image_ms + report.time_ms;
   line.points = scene.points.size();
   line.maxima = report.maxima;

@@ -22,9 +22,11 @@ struct RunOptions {
   std::vector<std::string> without;
   std::size_t peer_scenes = 0;  ///< So many of a part's first scenes are shown to OpenCV's surface_matching as well,
   std::size_t thorough_scenes = 0;  ///< and so many to our own search with all that it can try.
+  bool pictures = false;            ///< What was found in each scene is drawn into `out`/pictures.
   bool loops_in_names = false;      ///< Lines say which inner loops they were made with: runs of several may mix.
   RunHeader header() const;
   std::string base_file(const ScenePart& part) const;
+  std::string picture_folder() const;  ///< Empty: none.
   vision::DetectorOptions detector() const;
   vision::DetectorOptions thorough() const;
 };
@@ -45,9 +47,9 @@ vision::KnowledgeBase knowledge_base_of(const ScenePart& part, const std::string
 vision::DepthImage depth_image_of(const std::vector<Eigen::Vector3f>& points, const vision::KnowledgeBase& base,
                                   const vision::SupplyBox& supply);
 
-/// Detects once and writes down what came out; `line` has its names already.
+/// Detects once and writes down what came out; `line` has its names already. Drawn into the folder `pictures`, if any.
 void detect_scene(const Scene& scene, const Judge& judge, const vision::KnowledgeBase& base,
-                  vision::DetectorOptions options, SceneLine& line);
+                  vision::DetectorOptions options, SceneLine& line, const std::string& pictures = {});
 
 struct RunSelection {
   std::vector<std::string> classes, parts;  ///< Empty: all.
