@@ -306,7 +306,8 @@ class Detecting {
     finish(hypotheses, leaders, made);
     std::erase_if(others, [&](std::size_t i) {
       const Candidate& leader = made[leader_of[i]];
-      return score_of(leader.evidence) > kSettledScore && hypotheses[i].evidence < kSettledShare * leader.test.evidence;
+      return score_by_itself(leader.evidence) > kSettledScore &&
+             hypotheses[i].evidence < kSettledShare * leader.test.evidence;
     });
     finish(hypotheses, others, made);
     for (Candidate& c : made)
@@ -322,7 +323,7 @@ class Detecting {
     share(options_.threads, which.size(), deadline_, [&](std::size_t k, int thread) {
       Candidate& candidate = made[which[k]];
       candidate = finish_.finished(hypotheses[which[k]].pose, drawn[static_cast<std::size_t>(thread)]);
-      if (score_of(candidate.evidence) < kValidScore || !against(candidate.pose).empty()) return;
+      if (score_by_itself(candidate.evidence) < kValidScore || !against(candidate.pose).empty()) return;
       const std::scoped_lock lock{first_valid};
       if (!report_.first)
         report_.first = FirstValid{{candidate.pose.iso()}, milliseconds_since(start_), rendered_ + k + 1};
@@ -336,7 +337,7 @@ class Detecting {
     std::vector<const Candidate*> standing;
     std::vector<Eigen::Vector3f> centres;
     for (const Candidate& c : candidates) {
-      if (score_of(c.evidence) < kValidScore || !against(c.pose).empty()) continue;
+      if (score_by_itself(c.evidence) < kValidScore || !against(c.pose).empty()) continue;
       const Eigen::Vector3f centre = c.pose.R * centroid_ + c.pose.t;
       if (std::any_of(centres.begin(), centres.end(),
                       [&](const Eigen::Vector3f& other) { return (other - centre).norm() < place_mm; }))

@@ -21,7 +21,7 @@ enum class Clue : std::size_t {
   Looseness,     ///< Decimal logarithm of the pose's standard deviation, as displacement in part diameters.
   Claimed,       ///< Share of the explained pixels that better poses explain.
   Rival,         ///< Evidence of the best other pose of the same place over its own.
-  Company,       ///< Mean probability of the scene's other poses by themselves; a half where there are none.
+  Company,       ///< Probability, by itself, of the best of the scene's other poses; a half where there are none.
 };
 inline constexpr std::array<std::string_view, 15> kClueNames{"visible",     "contradicted", "contradicted at edges",
                                                              "missing",     "unseen",       "edges",

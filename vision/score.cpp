@@ -63,17 +63,13 @@ double against_rival(double rival, double scale) { return 1 / (1 + std::exp((riv
 
 double score_by_itself(const Evidence& evidence) { return logistic(kWeights, terms_of(evidence)); }
 
-double company(double sum_of_others, std::size_t others) {
-  return (sum_of_others + 0.5) / (static_cast<double>(others) + 1);
-}
-
 std::array<double, 3> second_terms(double by_itself, double company) {
-  const auto logit = [](double p) {
-    constexpr double kLeast = 1e-6;
-    const double q = std::clamp(p, kLeast, 1 - kLeast);
+  const auto logit = [](double p, double least) {
+    const double q = std::clamp(p, least, 1 - least);
     return std::log(q / (1 - q));
   };
-  return {1, logit(by_itself), logit(company)};
+  // The best of many is never quite impossible, and one that is sure is sure enough.
+  return {1, logit(by_itself, 1e-6), logit(company, 0.1)};
 }
 
 double score_of(const Evidence& evidence) {

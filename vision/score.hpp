@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 
@@ -23,7 +24,22 @@ double against_rival(double rival, double scale);
 double score_by_itself(const Evidence& evidence);
 /// Clue::Company, from the others' score_by_itself(): a supply in which nothing else looks like the part rarely holds
 /// one.
-double company(double sum_of_others, std::size_t others);
+class Company {
+ public:
+  void add(double by_itself) {
+    second_ = std::max(second_, std::min(best_, by_itself));
+    best_ = std::max(best_, by_itself);
+    ++count_;
+  }
+  /// Of one that was added.
+  double of(double by_itself) const { return count_ < 2 ? 0.5 : by_itself < best_ ? best_ : second_; }
+  /// Of one that was not.
+  double of_another() const { return count_ == 0 ? 0.5 : best_; }
+
+ private:
+  double best_ = 0, second_ = 0;
+  std::size_t count_ = 0;
+};
 /// What is linear in the second step: 1, the logit of score_by_itself() and that of the company.
 std::array<double, 3> second_terms(double by_itself, double company);
 

@@ -76,7 +76,7 @@ class Selecting {
     for (const Candidate& c : candidates_) {
       centres_.push_back(c.pose.R * options.centroid_mm + c.pose.t);
       std::string reason = options.outside ? options.outside(c.pose) : "";
-      if (reason.empty() && score_of(c.evidence) < options.score_min) reason = what_speaks_against(c.test);
+      if (reason.empty() && score_by_itself(c.evidence) < options.score_min) reason = what_speaks_against(c.test);
       own_reasons_.push_back(std::move(reason));
     }
     shown_.resize(candidates_.size());
@@ -147,7 +147,7 @@ class Selecting {
         compare_with_standing(i, entry);
       }
       entry.overshadowed = !entry.reason.empty();
-      if (entry.reason.empty() && score_of(entry.candidate.evidence) < options_.score_min)
+      if (entry.reason.empty() && score_by_itself(entry.candidate.evidence) < options_.score_min)
         entry.reason = what_speaks_against(entry.candidate.test);
     }
     if (entry.reason.empty()) {
@@ -160,14 +160,13 @@ class Selecting {
   }
 
   void tell_company() {
-    double sum = 0;
-    std::size_t count = 0;
+    Company company;
     for (const Selected& entry : all_)
-      if (!entry.overshadowed) sum += score_by_itself(entry.candidate.evidence), ++count;
+      if (!entry.overshadowed) company.add(score_by_itself(entry.candidate.evidence));
     for (Selected& entry : all_) {
       Evidence& evidence = entry.candidate.evidence;
-      evidence[Clue::Company] = static_cast<float>(
-          entry.overshadowed ? company(sum, count) : company(sum - score_by_itself(evidence), count - 1));
+      evidence[Clue::Company] =
+          static_cast<float>(entry.overshadowed ? company.of_another() : company.of(score_by_itself(evidence)));
     }
   }
 

@@ -110,17 +110,12 @@ Fit fitted(const std::vector<Example>& examples, double rival_scale) {
 }
 /// The same poses as the second step sees them: by themselves, and in the company of their scene's others.
 std::vector<Example> in_company(const std::vector<Example>& examples, const Fit& first) {
-  std::map<std::size_t, std::pair<double, std::size_t>> scenes;
-  for (const Example& e : examples) {
-    auto& [sum, count] = scenes[e.scene];
-    sum += by_itself(first, e);
-    ++count;
-  }
+  std::map<std::size_t, vision::Company> scenes;
+  for (const Example& e : examples) scenes[e.scene].add(by_itself(first, e));
   std::vector<Example> second = examples;
   for (Example& e : second) {
-    const auto& [sum, count] = scenes[e.scene];
     const double own = by_itself(first, e);
-    const auto terms = vision::second_terms(own, vision::company(sum - own, count - 1));
+    const auto terms = vision::second_terms(own, scenes[e.scene].of(own));
     e.terms = Eigen::Map<const Eigen::VectorXd>(terms.data(), static_cast<Eigen::Index>(terms.size()));
   }
   return second;

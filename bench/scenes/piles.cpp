@@ -72,9 +72,9 @@ SceneId Split::scene(std::size_t number) const {
 }
 
 const Split* find_split(std::string_view name) {
-  static const std::array<Split, 3> splits{Split{"tune", 1, 10, {1.0, 0.75, 0.5, 0.25}},
-                                           Split{"report", 1'001, 25, {0.9, 0.65, 0.4, 0.15}},
-                                           Split{"figure7", 5'001, 25, even_fills(120)}};
+  static const std::array<Split, 4> splits{
+      Split{"tune", 1, 10, {1.0, 0.75, 0.5, 0.25}}, Split{"last", 1, 10, {0.0, 0.06}},
+      Split{"report", 1'001, 25, {0.9, 0.65, 0.4, 0.15}}, Split{"figure7", 5'001, 25, even_fills(120)}};
   const auto it = std::ranges::find(splits, name, &Split::name);
   return it == splits.end() ? nullptr : &*it;
 }

@@ -28,7 +28,8 @@ struct Split {
   /// Neighbouring numbers differ in pile and in fill level, so that a few scenes are a fair sample.
   SceneId scene(std::size_t number) const;
 };
-/// "tune" (40 scenes), "report" (100) or "figure7" (3000); null: no such split.
+/// "tune" (40 scenes), "last" (20, the last one or two objects of these piles), "report" (100) or "figure7" (3000);
+/// null: no such split.
 const Split* find_split(std::string_view name);
 
 /// The settled pile, lowest object first. Kept in `folder` as a list of poses; settled anew where that has none.

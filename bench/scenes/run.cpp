@@ -197,7 +197,8 @@ void detect_scene(const Scene& scene, const Judge& judge, const vision::Knowledg
 
 void run(const RunOptions& options, const RunSelection& selection, const std::vector<Contender>& contenders) {
   const Split* split = find_split(selection.split);
-  if (split == nullptr) throw std::runtime_error{"no split \"" + selection.split + "\"; there are tune and report"};
+  if (split == nullptr)
+    throw std::runtime_error{"no split \"" + selection.split + "\"; there are tune, last, report and figure7"};
   RunFile file{options.out, options.header(), shard_name(selection.split, selection.shard, selection.shards)};
   for (const ClassSetting& setting : class_settings()) {
     if (!wanted(selection.classes, setting.name)) continue;

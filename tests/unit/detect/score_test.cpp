@@ -51,8 +51,18 @@ TEST(Score, ARivalThatExplainsAsMuchIsACoin) {
 }
 
 TEST(Score, NothingElseOfThePartMakesAPoseLessLikely) {
-  EXPECT_DOUBLE_EQ(company(0, 0), 0.5);
-  EXPECT_LT(company(0.2, 10), 0.1);
+  Company company;
+  EXPECT_DOUBLE_EQ(company.of_another(), 0.5);
+  company.add(0.9);
+  EXPECT_DOUBLE_EQ(company.of(0.9), 0.5);  // alone
+  EXPECT_DOUBLE_EQ(company.of_another(), 0.9);
+  company.add(0.1);
+  company.add(0.4);
+  EXPECT_DOUBLE_EQ(company.of(0.9), 0.4);
+  EXPECT_DOUBLE_EQ(company.of(0.4), 0.9);
+  EXPECT_DOUBLE_EQ(company.of_another(), 0.9);
+  company.add(0.9);
+  EXPECT_DOUBLE_EQ(company.of(0.9), 0.9);
   Evidence alone = good_evidence(), among_strangers = alone;
   among_strangers[Clue::Company] = 0.03F;
   EXPECT_LT(score_of(among_strangers), score_of(alone));
@@ -61,7 +71,7 @@ TEST(Score, NothingElseOfThePartMakesAPoseLessLikely) {
 TEST(Score, TermsOfAnythingAreFinite) {
   for (const double term : terms_of(Evidence{})) EXPECT_TRUE(std::isfinite(term));
   for (const double by_itself : {0.0, 1.0})
-    for (const double term : second_terms(by_itself, company(0, 5))) EXPECT_TRUE(std::isfinite(term));
+    for (const double term : second_terms(by_itself, 0)) EXPECT_TRUE(std::isfinite(term));
 }
 
 /// 60 × 60 pixels of 1 mm at a height of 10, nothing measured at x = 40 … 49, and a post of 60 mm at x = 30.
