@@ -12,6 +12,7 @@
 #include "bench/scenes/noise_truth.hpp"
 #include "bench/scenes/run.hpp"
 #include "bench/scenes/search.hpp"
+#include "bench/scenes/settle.hpp"
 #include "bench/scenes/table.hpp"
 
 namespace {
@@ -84,7 +85,7 @@ int main(int argc, char** argv) {
   add_run_options(*run_command, options);
   add_classes(*run_command, selection);
   add_parts(*run_command, selection);
-  run_command->add_option("--split", selection.split, "tune or report");
+  run_command->add_option("--split", selection.split, "tune, last, report or figure7");
   run_command->add_option_function<std::string>(
       "--scenes", [&](const std::string& text) { set_range(selection, text); }, "FROM:TO, numbers in the split");
   add_shard(*run_command, selection);
@@ -105,6 +106,14 @@ int main(int argc, char** argv) {
   alarms_command->add_option("--count", alarm_count, "scenes of each kind and class");
   alarms_command->add_option("--split", selection.split, "tune or report");
   add_shard(*alarms_command, selection);
+
+  CLI::App* settle_command = app.add_subcommand("settle", "settle the piles that runs over a split will need");
+  settle_command->add_option("--piles", options.piles, "folder of settled piles");
+  settle_command->add_option("--split", selection.split, "tune, last, report or figure7");
+  settle_command->add_option("--alarms", alarm_count, "for so many alarms of each kind and class");
+  add_classes(*settle_command, selection);
+  add_parts(*settle_command, selection);
+  add_shard(*settle_command, selection);
 
   std::size_t scenes = 20;
   const auto comparing = [&](const char* name, const char* what) {
@@ -134,6 +143,7 @@ int main(int argc, char** argv) {
     if (*run_command) run(options, selection);
     if (*figure7_command) figure7(options, count, selection.shard, selection.shards);
     if (*alarms_command) alarms(options, selection, alarm_count);
+    if (*settle_command) settle(options.piles, selection, alarm_count);
     if (*search_command) search(options, selection, scenes);
     if (*ablation_command) ablation(options, selection, scenes);
     if (*noise_command) print_noise_truth(cloud);
