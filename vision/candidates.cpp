@@ -161,69 +161,81 @@ std::vector<Eigen::Matrix3f> Finisher::principal_turns() const {
   return turns;
 }
 
-void Finisher::weigh_turns(std::vector<Candidate*> candidates) const {
+void Finisher::weigh_turns(std::vector<Candidate*> candidates, const std::function<bool(const Pose&)>& possible) const {
   constexpr std::array<double, 13> kFanDeg{3, 6, 10, 15, 22, 32, 45, 60, 80, 105, 130, 155, 180};
+  std::vector<Fan> fans;
   for (const Principal& principal : principal_axes()) {
     if (!principal.nearly_round) continue;
-    std::vector<double> fan_rad{0};
+    Fan fan{principal.axis, {0}};
     for (const double degrees : kFanDeg)
       for (const double sign : {-1.0, 1.0}) {
         const double angle = sign * degrees * std::numbers::pi / 180;
         // Beyond half of the symmetry's turn it is nearer to the next equal pose.
         if (pose_distance(Eigen::Isometry3d::Identity(), turned(principal.axis, angle), part_.symmetry, radius_mm_)
                 .angle_rad > 0.99 * std::abs(angle))
-          fan_rad.push_back(angle);
+          fan.angles_rad.push_back(angle);
       }
-    std::sort(fan_rad.begin(), fan_rad.end());
-    if (fan_rad.size() == 1) continue;
-    std::vector<Template> drawn = canvases();
-    share(options_.threads, candidates.size(), deadline_, [&](std::size_t i, int thread) {
-      weigh_turns(*candidates[i], principal.axis, fan_rad, drawn[static_cast<std::size_t>(thread)]);
-    });
+    std::sort(fan.angles_rad.begin(), fan.angles_rad.end());
+    if (fan.angles_rad.size() > 1) fans.push_back(std::move(fan));
   }
+  if (fans.empty()) return;
+  // What the deadline leaves unweighed may be turned anyhow.
+  for (Candidate* candidate : candidates)
+    for (const Fan& fan : fans) add_loose(*candidate, fan, fan.angles_rad.back() * fan.angles_rad.back() / 3);
+  std::vector<Template> drawn = canvases();
+  share(options_.threads, candidates.size(), deadline_, [&](std::size_t i, int thread) {
+    Candidate weighed = *candidates[i];
+    weighed.loose_turn_rad2.setZero();
+    for (const Fan& fan : fans) weigh_turns(weighed, fan, possible, drawn[static_cast<std::size_t>(thread)]);
+    *candidates[i] = weighed;
+  });
 }
 
-void Finisher::weigh_turns(Candidate& candidate, const Eigen::Vector3d& axis, const std::vector<double>& angles_rad,
+void Finisher::add_loose(Candidate& candidate, const Fan& fan, double variance_rad2) {
+  const Eigen::Vector3d axis = candidate.pose.R.cast<double>() * fan.axis;
+  candidate.loose_turn_rad2 += variance_rad2 * axis * axis.transpose();
+}
+
+void Finisher::weigh_turns(Candidate& candidate, const Fan& fan, const std::function<bool(const Pose&)>& possible,
                            Template& drawn) const {
-  /// sd of the evidence over the root of its pixels.
+  /// By how much noise makes evidence differ, over the root of the pixels.
   constexpr double kEvidenceNoise = 0.5;
   const auto turned_by = [&](double angle) {
-    const Eigen::Matrix3f R = candidate.pose.R * Eigen::AngleAxisd(angle, axis).toRotationMatrix().cast<float>();
+    const Eigen::Matrix3f R = candidate.pose.R * Eigen::AngleAxisd(angle, fan.axis).toRotationMatrix().cast<float>();
     return Pose{R, candidate.pose.R * centroid_ + candidate.pose.t - R * centroid_};
   };
-  struct Turn {
-    double angle_rad, evidence;
-  };
-  std::vector<Turn> fan;
+  std::vector<double> evidence(fan.angles_rad.size());
   const auto look = [&] {
-    fan.clear();
-    for (const double angle : angles_rad) {
-      const Pose pose = turned_by(angle);
+    for (std::size_t k = 0; k < evidence.size(); ++k) {
+      const Pose pose = turned_by(fan.angles_rad[k]);
       rasteriser_.draw(pose.R, pose.t, scene_.pixel_mm, scene_.origin_mm, drawn, false);
-      fan.push_back({angle, static_cast<double>(dense_test(scene_, rasteriser_, pose, drawn).evidence)});
+      evidence[k] = static_cast<double>(dense_test(scene_, rasteriser_, pose, drawn).evidence);
     }
-    return *std::max_element(fan.begin(), fan.end(),
-                             [](const Turn& a, const Turn& b) { return a.evidence < b.evidence; });
+    return static_cast<std::size_t>(std::max_element(evidence.begin(), evidence.end()) - evidence.begin());
   };
-  Turn best = look();
-  for (int again = 0; again < 2 && best.angle_rad != 0; ++again) {
-    const Candidate other = finished(turned_by(best.angle_rad), drawn);
-    if (other.test.evidence <= candidate.test.evidence) break;
+  std::size_t best = look();
+  for (int again = 0; again < 2 && fan.angles_rad[best] != 0; ++again) {
+    const Candidate other = finished(turned_by(fan.angles_rad[best]), drawn);
+    if (other.test.evidence <= candidate.test.evidence || !possible(other.pose)) break;
     candidate.pose = other.pose;
     candidate.test = other.test;
     candidate.information = other.information;
+    // What other poses say of it stays.
+    Evidence told = other.evidence;
+    for (const Clue clue : {Clue::Claimed, Clue::Rival, Clue::Company}) told[clue] = candidate.evidence[clue];
+    candidate.evidence = told;
     best = look();
   }
-  if (best.evidence <= 0) return;
+  if (evidence[best] <= 0) return;
   double weights = 0, squares = 0;
-  for (std::size_t k = 0; k < fan.size(); ++k) {
-    const double width = fan[std::min(k + 1, fan.size() - 1)].angle_rad - fan[k == 0 ? 0 : k - 1].angle_rad;
-    const double likelihood =
-        width * std::exp((fan[k].evidence - best.evidence) / (kEvidenceNoise * std::sqrt(best.evidence)));
-    weights += likelihood;
-    squares += likelihood * fan[k].angle_rad * fan[k].angle_rad;
+  for (std::size_t k = 0; k < evidence.size(); ++k) {
+    const double width = fan.angles_rad[std::min(k + 1, evidence.size() - 1)] - fan.angles_rad[k == 0 ? 0 : k - 1];
+    const double weight =
+        width * std::exp((evidence[k] - evidence[best]) / (kEvidenceNoise * std::sqrt(evidence[best])));
+    weights += weight;
+    squares += weight * fan.angles_rad[k] * fan.angles_rad[k];
   }
-  candidate.loose_turn_rad += candidate.pose.R.cast<double>() * axis * std::sqrt(squares / weights);
+  add_loose(candidate, fan, squares / weights);
 }
 
 Matrix6 Finisher::covariance_of(const Candidate& candidate) const {
@@ -235,7 +247,7 @@ Matrix6 Finisher::covariance_of(const Candidate& candidate) const {
   prior.diagonal().tail<3>().setConstant(1 / std::pow(0.3, 2));
   Matrix6 covariance = (candidate.information / kCorrelation + prior).inverse();
   covariance.diagonal().head<3>().array() += std::pow(kCommonShare * scene_.noise_mm, 2);
-  covariance.bottomRightCorner<3, 3>() += candidate.loose_turn_rad * candidate.loose_turn_rad.transpose();
+  covariance.bottomRightCorner<3, 3>() += candidate.loose_turn_rad2;
   return 0.5 * (covariance + covariance.transpose());
 }
 

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -34,9 +35,9 @@ class Finisher {
   /// how sure the first one is. Adds what comes near.
   void add_turned(std::vector<Candidate>& candidates, std::size_t strongest, double same_mm) const;
   /// A part that is nearly round shows how it is turned by little: a wheel by its spokes, which may be hidden, while
-  /// its rim's edges look as if they told. What the picture says of each turn is measured: a better one is taken, and
-  /// Candidate::loose_turn_rad tells how many are as good.
-  void weigh_turns(std::vector<Candidate*> candidates) const;
+  /// its rim's edges look as if they told. What the picture says of each turn is measured: a better one is taken, if it
+  /// is possible, and Candidate::loose_turn_rad2 tells how many are nearly as good: all, where the deadline came first.
+  void weigh_turns(std::vector<Candidate*> candidates, const std::function<bool(const Pose&)>& possible) const;
 
   /// Of (translation mm, rotation rad) about the centroid, supply axes.
   Matrix6 covariance_of(const Candidate& candidate) const;
@@ -54,7 +55,13 @@ class Finisher {
   std::array<Principal, 3> principal_axes() const;
   Eigen::Isometry3d turned(const Eigen::Vector3d& axis, double angle_rad) const;
   std::vector<Eigen::Matrix3f> principal_turns() const;
-  void weigh_turns(Candidate& candidate, const Eigen::Vector3d& axis, const std::vector<double>& angles_rad,
+  /// Turns about an axis that are tried beside each other, from low to high; 0 is one of them.
+  struct Fan {
+    Eigen::Vector3d axis;  ///< Object frame, through the centroid.
+    std::vector<double> angles_rad;
+  };
+  static void add_loose(Candidate& candidate, const Fan& fan, double variance_rad2);
+  void weigh_turns(Candidate& candidate, const Fan& fan, const std::function<bool(const Pose&)>& possible,
                    Template& drawn) const;
   float looseness_of(const Candidate& candidate) const;
   std::vector<Template> canvases() const;

@@ -46,8 +46,9 @@ constexpr double kScoreMin = 0.1;
 /// From this on a pose is valid by itself.
 constexpr double kValidScore = 0.5;
 
-constexpr std::array<std::string_view, 8> kAdditions{"edges",        "first look",  "turned",      "rooms",
-                                                     "explain away", "second pass", "all anchors", "second refinement"};
+constexpr std::array<std::string_view, 9> kAdditions{"edges",         "first look",  "turned",
+                                                     "weighed turns", "rooms",       "explain away",
+                                                     "second pass",   "all anchors", "second refinement"};
 
 /// The memory of the last scene, for the next one of this thread.
 Scene& spare_scene() {
@@ -99,7 +100,7 @@ class Detecting {
     std::vector<Selected> selected =
         select(scene_, finish_.rasteriser(), part_.symmetry, std::move(candidates), select_options());
     ended("selection");
-    weigh_turns(selected);
+    if (with("weighed turns")) weigh_turns(selected);
     ended("rendered test");
     report(selected);
     observed("selection", report_.detections, [](const Detection& d) { return d.T_supply_object.iso; });
@@ -384,7 +385,10 @@ class Detecting {
     std::vector<Candidate*> believed;
     for (Selected& entry : selected)
       if (entry.reason.empty() && entry.score >= kScoreMin) believed.push_back(&entry.candidate);
-    finish_.weigh_turns(believed);
+    finish_.weigh_turns(believed, [this](const Pose& pose) { return against(pose).empty(); });
+    for (Selected& entry : selected) entry.score = score_of(entry.candidate.evidence);
+    std::stable_sort(selected.begin(), selected.end(),
+                     [](const Selected& a, const Selected& b) { return a.score > b.score; });
   }
 
   void report(const std::vector<Selected>& selected) {

@@ -81,6 +81,7 @@ Obstacle obstacle(const Eigen::Isometry3d& T_supply_tcp, double tilt_rad, const 
 double within(double limit, const Eigen::Matrix3d& covariance) {
   const double variance =
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>{covariance, Eigen::EigenvaluesOnly}.eigenvalues().maxCoeff();
+  if (!(variance >= 0)) return 0;  // not a number
   return variance > 0 ? std::erf(limit / std::sqrt(2 * variance)) : 1;
 }
 }  // namespace

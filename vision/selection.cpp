@@ -76,6 +76,7 @@ class Selecting {
     for (const Candidate& c : candidates_) {
       centres_.push_back(c.pose.R * options.centroid_mm + c.pose.t);
       std::string reason = options.outside ? options.outside(c.pose) : "";
+      outside_.push_back(!reason.empty());
       if (reason.empty() && score_by_itself(c.evidence) < options.score_min) reason = what_speaks_against(c.test);
       own_reasons_.push_back(std::move(reason));
     }
@@ -134,7 +135,7 @@ class Selecting {
   void judge(std::size_t i) {
     if (std::any_of(standing_.begin(), standing_.end(), [&](const Standing& s) { return same(s.candidate, i); }))
       return;
-    Selected entry{candidates_[i], 0, own_reasons_[i], false};
+    Selected entry{.candidate = candidates_[i], .reason = own_reasons_[i], .outside = outside_[i]};
     if (entry.reason.empty()) {
       if (const auto there = std::find_if(standing_.begin(), standing_.end(),
                                           [&](const Standing& s) { return in_one_place(s.candidate, i); });
@@ -162,11 +163,11 @@ class Selecting {
   void tell_company() {
     Company company;
     for (const Selected& entry : all_)
-      if (!entry.overshadowed) company.add(score_by_itself(entry.candidate.evidence));
+      if (!entry.overshadowed && !entry.outside) company.add(score_by_itself(entry.candidate.evidence));
     for (Selected& entry : all_) {
       Evidence& evidence = entry.candidate.evidence;
-      evidence[Clue::Company] =
-          static_cast<float>(entry.overshadowed ? company.of_another() : company.of(score_by_itself(evidence)));
+      evidence[Clue::Company] = static_cast<float>(
+          entry.overshadowed || entry.outside ? company.of_another() : company.of(score_by_itself(evidence)));
     }
   }
 
@@ -206,6 +207,7 @@ class Selecting {
   std::vector<Candidate> candidates_;  // strongest first
   std::vector<Eigen::Vector3f> centres_;
   std::vector<std::string> own_reasons_;
+  std::vector<bool> outside_;
   std::vector<Shown> shown_;
   std::vector<Standing> standing_;
   std::vector<Selected> all_;

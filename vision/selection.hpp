@@ -14,8 +14,9 @@ struct Candidate {
   Pose pose;
   DenseTest test;
   Matrix6 information = Matrix6::Zero();
-  Eigen::Vector3d loose_turn_rad = Eigen::Vector3d::Zero();  ///< One sd more of a turn that the picture hardly tells.
-  Evidence evidence;                                         ///< Without Clue::Claimed and Clue::Rival before select().
+  Eigen::Matrix3d loose_turn_rad2 = Eigen::Matrix3d::Zero();  ///< More covariance of the rotation, supply axes: turns
+                                                              ///< that the picture hardly tells.
+  Evidence evidence;  ///< Without Clue::Claimed and Clue::Rival before select().
 };
 
 struct SelectOptions {
@@ -35,6 +36,7 @@ struct Selected {
   double score = 0;           ///< Probability of being right.
   std::string reason;         ///< Why it is not believed; empty: it is.
   bool overshadowed = false;  ///< The reason is a better one at the same place.
+  bool outside = false;       ///< The part cannot be there at all.
 };
 
 /// Goes through the candidates by evidence: the first stands; what shows the same object again is dropped, what lives

@@ -29,14 +29,16 @@ void settle(const std::string& piles, const RunSelection& selection, std::size_t
   };
   for (const ClassSetting& setting : class_settings()) {
     if (!wanted(selection.classes, setting.name)) continue;
-    for (const std::string& name : part_names(setting.scanner)) {
+    std::vector<std::string> names = part_names(setting.scanner);
+    if (setting.scanner == vision::ScannerClass::Lms400 && !selection.parts.empty()) names.emplace_back(kDeepPart);
+    for (const std::string& name : names) {
       if (!wanted(selection.parts, name)) continue;
       const ScenePart part = scene_part(setting.scanner, name);
       for (std::size_t k = selection.from; k < std::min(selection.to, split->scenes()); ++k)
         add(part, split->scene(k).pile);
     }
     const std::string alarms = "alarms-" + selection.split;
-    if (!is_alarm_split(alarms)) continue;
+    if (!is_alarm_split(alarms) || !selection.parts.empty()) continue;
     for (std::size_t k = 0; k < alarm_count * kAlarmKinds.size(); ++k)
       if (const AlarmScene alarm = alarm_scene(setting, alarms, k); !alarm.empty()) add(alarm.there, alarm.id.pile);
   }
