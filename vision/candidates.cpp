@@ -71,8 +71,11 @@ Candidate Finisher::finished(Pose pose, Template& drawn) const {
   if (candidate.test.evidence < 0) return candidate;  // hopeless
   rasteriser_.draw(pose.R, pose.t, scene_.pixel_mm, scene_.origin_mm, drawn, false);
   candidate.test = dense_test(scene_, rasteriser_, pose, drawn);
-  candidate.test.unseen = unseen_pixels(scene_, *shadows_, rasteriser_, pose.R, drawn);
-  candidate.test.evidence -= kMissingWeight * static_cast<float>(candidate.test.missing) +
+  const Absent absent = absent_pixels(scene_, *shadows_, rasteriser_, pose.R, drawn);
+  candidate.test.holes = absent.holes;
+  candidate.test.unseen = absent.unseen;
+  candidate.test.ends = absent.ends;
+  candidate.test.evidence -= kMissingWeight * static_cast<float>(candidate.test.missing - absent.holes) +
                              kUnseenWeight * static_cast<float>(candidate.test.unseen);
   candidate.evidence = evidence_of(candidate.test);
   candidate.evidence[Clue::Looseness] = looseness_of(candidate);

@@ -25,7 +25,7 @@ class Finisher {
   Finisher(const Scene& scene, const KnowledgeBase::Impl& part, const Deadline& deadline, const FinishOptions& options);
 
   /// To be called once the scene is prepared, before all else.
-  void begin() { shadows_.emplace(scene_); }
+  void begin(const SupplyBox& supply) { shadows_.emplace(scene_, supply); }
   /// Evidence of the poses as they are by a coarse render: cheaper than refinement by far.
   std::vector<float> looked_at(const std::vector<Pose>& poses) const;
   /// Refined against its own render, twice; then the rendered test.

@@ -78,7 +78,7 @@ class Detecting {
     bounds_.emplace(scene_, supply_, part_.diameter_mm);
     lowest_allowed_mm_ = static_cast<float>(
         bounds_->floor_mm() - std::max(3 * noise_mm_, kFloorGateDiameters * coarseness() * part_.diameter_mm));
-    finish_.begin();
+    finish_.begin(supply_);
     ended("surface");
     const std::vector<Eigen::Vector3f> maxima = anchors();
     report_.maxima = maxima.size();

@@ -11,7 +11,9 @@ enum class Clue : std::size_t {
   Contradicted,  ///< Share of what is visible that one sees through, away from the model's edges.
   Border,        ///< The same beside the model's edges.
   Missing,       ///< Share of the silhouette that was not measured.
+  Holes,         ///< Share of the silhouette between the points of one surface: how sparse the scan is there.
   Unseen,        ///< Share of the silhouette that was not measured although nothing hides it.
+  Ends,          ///< Length of the measured surface's ends within the part's, over four times the root of its pixels.
   Edges,         ///< Share of the model's depth edges found where they can be told.
   EdgeLength,    ///< How many can be told, over four times the root of the silhouette's pixels.
   Normals,       ///< Share of explained pixels with the model's normal.
@@ -23,11 +25,12 @@ enum class Clue : std::size_t {
   Rival,         ///< Evidence of the best other pose of the same place over its own.
   Company,       ///< Probability, by itself, of the best of the scene's other poses; a half where there are none.
 };
-inline constexpr std::array<std::string_view, 15> kClueNames{"visible",     "contradicted", "contradicted at edges",
-                                                             "missing",     "unseen",       "edges",
-                                                             "edge length", "normals",      "curvature",
-                                                             "fit",         "size",         "looseness",
-                                                             "claimed",     "rival",        "company"};
+inline constexpr std::array<std::string_view, 17> kClueNames{"visible", "contradicted", "contradicted at edges",
+                                                             "missing", "holes",        "unseen",
+                                                             "ends",    "edges",        "edge length",
+                                                             "normals", "curvature",    "fit",
+                                                             "size",    "looseness",    "claimed",
+                                                             "rival",   "company"};
 
 struct Evidence {
   std::array<float, kClueNames.size()> clues{};

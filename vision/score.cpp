@@ -16,14 +16,17 @@ double logistic(const std::array<double, N>& weights, const std::array<double, N
 }  // namespace
 
 Evidence evidence_of(const DenseTest& test) {
-  const auto pixels = static_cast<float>(std::max(1, test.pixels));
+  // Of a sparse scan, what a dense one would show: the gaps between its points are left out.
+  const auto pixels = static_cast<float>(std::max(1, test.pixels - test.holes));
   const auto seen = static_cast<float>(std::max(1, test.explained + test.contradicted));
   Evidence e;
   e[Clue::Visible] = test.visible_fraction();
   e[Clue::Contradicted] = static_cast<float>(test.contradicted - test.contradicted_border) / seen;
   e[Clue::Border] = static_cast<float>(test.contradicted_border) / seen;
-  e[Clue::Missing] = static_cast<float>(test.missing) / pixels;
+  e[Clue::Missing] = static_cast<float>(test.missing - test.holes) / pixels;
+  e[Clue::Holes] = static_cast<float>(test.holes) / static_cast<float>(std::max(1, test.pixels));
   e[Clue::Unseen] = static_cast<float>(test.unseen) / pixels;
+  e[Clue::Ends] = static_cast<float>(test.ends) / (4 * std::sqrt(pixels));
   e[Clue::Edges] = test.edge_ratio();
   e[Clue::EdgeLength] = static_cast<float>(test.edges_found + test.edges_missing) / (4 * std::sqrt(pixels));
   e[Clue::Normals] = test.normal_agreement;
@@ -39,6 +42,8 @@ std::array<double, kTerms> terms_of(const Evidence& e) {
   // Few edges say little: as if a tenth of the outline more were half found.
   const double edges = (at(Clue::Edges) * at(Clue::EdgeLength) + 0.05) / (at(Clue::EdgeLength) + 0.1);
   const auto root = [](double x) { return std::sqrt(std::max(0.0, x)); };
+  // Where a scan is sparse, what is not there may be between its points.
+  const double dense = std::max(0.0, 1 - at(Clue::Holes) / 0.15);
   return {1.0,
           std::min(0.3, at(Clue::Visible)),
           std::max(0.0, at(Clue::Visible) - 0.3),
@@ -46,7 +51,9 @@ std::array<double, kTerms> terms_of(const Evidence& e) {
           root(at(Clue::Contradicted)),
           at(Clue::Border),
           at(Clue::Missing),
-          root(at(Clue::Unseen)),
+          at(Clue::Holes),
+          dense * root(at(Clue::Unseen)),
+          dense * root(at(Clue::Ends)),
           edges,
           edges * edges,
           std::min(1.0, at(Clue::EdgeLength) * at(Clue::Edges)),

@@ -13,7 +13,7 @@ namespace binpick::vision {
 Evidence evidence_of(const DenseTest& test);
 
 /// What is linear in the score: the clues, bent. Calibration fits the weights of these.
-inline constexpr std::size_t kTerms = 18;
+inline constexpr std::size_t kTerms = 20;
 std::array<double, kTerms> terms_of(const Evidence& evidence);
 
 /// A rival that explains as much is as likely: a half then; it goes to one as the rival's evidence falls short, by the

@@ -113,7 +113,7 @@ float sparse_evidence(const Scene& scene, const KnowledgeBase::Impl& part, std::
 }
 
 float DenseTest::visible_fraction() const {
-  return pixels == 0 ? 0 : static_cast<float>(explained + contradicted) / static_cast<float>(pixels);
+  return static_cast<float>(explained + contradicted) / static_cast<float>(std::max(1, pixels - holes));
 }
 float DenseTest::contradicted_ratio() const {
   return static_cast<float>(contradicted) / static_cast<float>(std::max(1, explained + contradicted));

@@ -41,7 +41,9 @@ struct DenseTest {
   int contradicted_border = 0;  ///< Of these, beside an edge of the model: may be half a pixel of pose error.
   int occluded = 0;             ///< Measured above the model: something lies on it.
   int missing = 0;              ///< Not measured, or outside the picture.
-  int unseen = 0;               ///< Of these, what nothing hides (shadows.hpp); not counted by dense_test().
+  int holes = 0;                ///< Of these, gaps between the points of one surface (shadows.hpp),
+  int unseen = 0;               ///< and what nothing hides;
+  int ends = 0;                 ///< where the measured surface ends within the part's. None counted by dense_test().
   float fit = 0;                ///< Explained pixels, each weighted by how well, over explained pixels.
   int edges_found = 0;          ///< Depth jumps of the model that the scene has too.
   int edges_missing = 0;        ///< Depth jumps of the model where the measured surface goes on.

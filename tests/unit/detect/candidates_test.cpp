@@ -43,7 +43,7 @@ std::vector<Candidate> candidates(const Setting& setting, const std::vector<Eige
   FinishOptions options;
   options.threads = setting.threads;
   Finisher finisher{scene, dial.impl(), deadline, options};
-  finisher.begin();
+  finisher.begin({});
   Template drawn;
   std::vector<Candidate> all;
   for (const Eigen::Isometry3d& start : starts)
@@ -126,7 +126,7 @@ TEST(Candidates, APartThatIsNotRoundIsLeftAsItIs) {
   const Scene scene = prepare_scene(scenes::image_of(bracket.mesh(), {truth}, 2), scenes::kNoiseMm, 1);
   const Deadline none;
   Finisher finisher{scene, bracket.impl(), none, {}};
-  finisher.begin();
+  finisher.begin({});
   Template drawn;
   Candidate candidate = finisher.finished({truth.linear().cast<float>(), truth.translation().cast<float>()}, drawn);
   finisher.weigh_turns({&candidate}, [](const Pose&) { return true; });
