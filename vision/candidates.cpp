@@ -208,15 +208,13 @@ void Finisher::weigh_turns(Candidate& candidate, const Fan& fan, const std::func
     return Pose{R, candidate.pose.R * centroid_ + candidate.pose.t - R * centroid_};
   };
   std::vector<double> evidence(fan.angles_rad.size());
-  const auto look = [&] {
-    for (std::size_t k = 0; k < evidence.size(); ++k) {
-      const Pose pose = turned_by(fan.angles_rad[k]);
-      rasteriser_.draw(pose.R, pose.t, scene_.pixel_mm, scene_.origin_mm, drawn, false);
-      evidence[k] = static_cast<double>(dense_test(scene_, rasteriser_, pose, drawn).evidence);
-    }
+  const auto look = [&](int every) {
+    for (std::size_t k = 0; k < evidence.size(); ++k)
+      evidence[k] = static_cast<double>(glance(scene_, rasteriser_, turned_by(fan.angles_rad[k]), drawn, every));
     return static_cast<std::size_t>(std::max_element(evidence.begin(), evidence.end()) - evidence.begin());
   };
-  std::size_t best = look();
+  // Every second pixel tells whether another turn is better, in a quarter of the time.
+  std::size_t best = look(std::min(2, glance_every(scene_, part_.diameter_mm)));
   for (int again = 0; again < 2 && fan.angles_rad[best] != 0; ++again) {
     const Candidate other = finished(turned_by(fan.angles_rad[best]), drawn);
     if (other.test.evidence <= candidate.test.evidence || !possible(other.pose)) break;
@@ -227,7 +225,7 @@ void Finisher::weigh_turns(Candidate& candidate, const Fan& fan, const std::func
     Evidence told = other.evidence;
     for (const Clue clue : {Clue::Claimed, Clue::Rival, Clue::Company}) told[clue] = candidate.evidence[clue];
     candidate.evidence = told;
-    best = look();
+    best = look(1);
   }
   if (evidence[best] <= 0) return;
   double weights = 0, squares = 0;

@@ -11,6 +11,8 @@ namespace binpick::bench {
 namespace {
 constexpr std::string_view kTune = "alarms-tune", kReport = "alarms-report";
 constexpr std::uint64_t kTunePile = 8'001, kReportPile = 9'001, kPiles = 6;
+/// The fit needs many kinds of seams and shadows between bodies that are not ours.
+constexpr std::uint64_t kTuneForeignPiles = 24;
 
 /// Bricks or bolts of about the size of the class's parts. (The bolt's shank is no shaft of ours: one of the same
 /// radius, its other end in the bolt's head, could not be told from a shaft.)
@@ -50,7 +52,8 @@ AlarmScene alarm_scene(const ClassSetting& setting, const std::string& split, st
   scene.there = scene.kind == 0
                     ? scene_part(setting.scanner, names[(k + 1 + round % (names.size() - 1)) % names.size()])
                     : foreign_part(setting, round % 2 != 0);
-  scene.id = {first_pile + k % kPiles, fills[k / kPiles % fills.size()], first_pile * 1'000 + number};
+  const std::uint64_t piles = split == kTune && scene.kind == 2 ? kTuneForeignPiles : kPiles;
+  scene.id = {first_pile + k % piles, fills[k / piles % fills.size()], first_pile * 1'000 + number};
   return scene;
 }
 

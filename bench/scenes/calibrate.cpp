@@ -17,7 +17,7 @@ namespace binpick::bench {
 namespace {
 constexpr double kRidge = 0.3;
 /// A wrong pose where nothing is to be found is worse than one among many right ones.
-constexpr double kAlarmWeight = 4;
+constexpr double kAlarmWeight = 2;
 constexpr int kSteps = 100;
 /// No wider: a rival two per cent short of an object that lies open is no coin.
 constexpr std::array kRivalScales{0.0005, 0.001, 0.002, 0.003, 0.004, 0.006, 0.008};
