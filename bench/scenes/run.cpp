@@ -195,17 +195,21 @@ void detect_scene(const Scene& scene, const Judge& judge, const vision::Knowledg
                            judge.nearest_mm(report.first->T_supply_object.iso, scene.truths) < judge.threshold_mm()};
 }
 
+std::vector<std::string> selected_parts(const ClassSetting& setting, const RunSelection& selection) {
+  if (!wanted(selection.classes, setting.name)) return {};
+  std::vector<std::string> names = part_names(setting.scanner);
+  if (setting.scanner == vision::ScannerClass::Lms400 && !selection.parts.empty()) names.emplace_back(kDeepPart);
+  std::erase_if(names, [&](const std::string& name) { return !wanted(selection.parts, name); });
+  return names;
+}
+
 void run(const RunOptions& options, const RunSelection& selection, const std::vector<Contender>& contenders) {
   const Split* split = find_split(selection.split);
   if (split == nullptr)
     throw std::runtime_error{"no split \"" + selection.split + "\"; there are tune, last, report and figure7"};
   RunFile file{options.out, options.header(), shard_name(selection.split, selection.shard, selection.shards)};
   for (const ClassSetting& setting : class_settings()) {
-    if (!wanted(selection.classes, setting.name)) continue;
-    std::vector<std::string> names = part_names(setting.scanner);
-    if (setting.scanner == vision::ScannerClass::Lms400 && !selection.parts.empty()) names.emplace_back(kDeepPart);
-    for (const std::string& name : names) {
-      if (!wanted(selection.parts, name)) continue;
+    for (const std::string& name : selected_parts(setting, selection)) {
       std::optional<PartRun> part;  // trained when the first scene asks for it
       for (std::size_t number = selection.from; number < std::min(selection.to, split->scenes()); ++number) {
         if (number % selection.shards != selection.shard) continue;

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "bench/scenes/classes.hpp"
 #include "bench/scenes/judge.hpp"
 #include "bench/scenes/lines.hpp"
 #include "bench/scenes/piles.hpp"
@@ -57,6 +58,8 @@ struct RunSelection {
   std::size_t from = 0, to = 1'000'000;  ///< Scenes of the split.
   std::size_t shard = 0, shards = 1;
 };
+/// Those of a class that are selected; the deep supply only where it is named.
+std::vector<std::string> selected_parts(const ClassSetting& setting, const RunSelection& selection);
 /// One way of looking at the scenes; its lines bear its name.
 struct Contender {
   std::string name;

@@ -11,12 +11,6 @@
 #include "bench/scenes/classes.hpp"
 
 namespace binpick::bench {
-namespace {
-bool wanted(const std::vector<std::string>& names, std::string_view name) {
-  return names.empty() || std::ranges::find(names, name) != names.end();
-}
-}  // namespace
-
 void settle(const std::string& piles, const RunSelection& selection, std::size_t alarm_count) {
   const Split* split = find_split(selection.split);
   if (split == nullptr)
@@ -28,17 +22,14 @@ void settle(const std::string& piles, const RunSelection& selection, std::size_t
     if (known.insert(name).second) missing.emplace_back(part, pile);
   };
   for (const ClassSetting& setting : class_settings()) {
-    if (!wanted(selection.classes, setting.name)) continue;
-    std::vector<std::string> names = part_names(setting.scanner);
-    if (setting.scanner == vision::ScannerClass::Lms400 && !selection.parts.empty()) names.emplace_back(kDeepPart);
+    const std::vector<std::string> names = selected_parts(setting, selection);
     for (const std::string& name : names) {
-      if (!wanted(selection.parts, name)) continue;
       const ScenePart part = scene_part(setting.scanner, name);
       for (std::size_t k = selection.from; k < std::min(selection.to, split->scenes()); ++k)
         add(part, split->scene(k).pile);
     }
     const std::string alarms = "alarms-" + selection.split;
-    if (!is_alarm_split(alarms) || !selection.parts.empty()) continue;
+    if (!is_alarm_split(alarms) || names.empty() || !selection.parts.empty()) continue;
     for (std::size_t k = 0; k < alarm_count * kAlarmKinds.size(); ++k)
       if (const AlarmScene alarm = alarm_scene(setting, alarms, k); !alarm.empty()) add(alarm.there, alarm.id.pile);
   }
