@@ -52,8 +52,13 @@ AlarmScene alarm_scene(const ClassSetting& setting, const std::string& split, st
   scene.there = scene.kind == 0
                     ? scene_part(setting.scanner, names[(k + 1 + round % (names.size() - 1)) % names.size()])
                     : foreign_part(setting, round % 2 != 0);
-  const std::uint64_t piles = split == kTune && scene.kind == 2 ? kTuneForeignPiles : kPiles;
-  scene.id = {first_pile + k % piles, fills[k / piles % fills.size()], first_pile * 1'000 + number};
+  scene.id = {first_pile + k % kPiles, fills[k / kPiles % fills.size()], first_pile * 1'000 + number};
+  if (split == kTune && scene.kind == 2) {
+    // Each part sees all piles of either body.
+    const std::size_t pair = round / 2;
+    scene.id.pile = first_pile + pair % kTuneForeignPiles;
+    scene.id.fill = fills[(pair + pair / kTuneForeignPiles) % fills.size()];
+  }
   return scene;
 }
 

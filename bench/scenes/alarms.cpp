@@ -38,6 +38,8 @@ void alarms(const RunOptions& options, const RunSelection& selection, std::size_
       // By kinds together: an empty supply takes less time, and each shard has its share.
       if (number / kAlarmKinds.size() % selection.shards != selection.shard) continue;
       const AlarmScene alarm = alarm_scene(setting, split, number);
+      if (!selection.parts.empty() && std::ranges::find(selection.parts, alarm.wanted) == selection.parts.end())
+        continue;
       SceneLine line;
       line.scanner = setting.name;
       line.part = alarm.wanted;

@@ -103,6 +103,7 @@ int main(int argc, char** argv) {
   CLI::App* alarms_command = app.add_subcommand("alarms", "detections where nothing of the part is");
   add_run_options(*alarms_command, options);
   add_classes(*alarms_command, selection);
+  add_parts(*alarms_command, selection);
   alarms_command->add_option("--count", alarm_count, "scenes of each kind and class");
   alarms_command->add_option("--split", selection.split, "tune or report");
   add_shard(*alarms_command, selection);

@@ -79,6 +79,13 @@ const Split* find_split(std::string_view name) {
   return it == splits.end() ? nullptr : &*it;
 }
 
+const Split& split_named(std::string_view name) {
+  const Split* split = find_split(name);
+  if (split == nullptr)
+    throw std::runtime_error{"no split \"" + std::string{name} + "\"; there are tune, last, report and figure7"};
+  return *split;
+}
+
 std::vector<ObjectPose> settled_pile(const ScenePart& part, std::uint64_t seed, const std::string& folder) {
   const ClassSetting setting = setting_of(part);
   std::string own_supply;

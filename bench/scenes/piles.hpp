@@ -31,6 +31,8 @@ struct Split {
 /// "tune" (40 scenes), "last" (20, the last one or two objects of these piles), "report" (100) or "figure7" (3000);
 /// null: no such split.
 const Split* find_split(std::string_view name);
+/// The same; throws where there is no such split, and says which there are.
+const Split& split_named(std::string_view name);
 
 /// The settled pile, lowest object first. Kept in `folder` as a list of poses; settled anew where that has none.
 std::vector<ObjectPose> settled_pile(const ScenePart& part, std::uint64_t seed, const std::string& folder);

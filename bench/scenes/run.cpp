@@ -204,14 +204,12 @@ std::vector<std::string> selected_parts(const ClassSetting& setting, const RunSe
 }
 
 void run(const RunOptions& options, const RunSelection& selection, const std::vector<Contender>& contenders) {
-  const Split* split = find_split(selection.split);
-  if (split == nullptr)
-    throw std::runtime_error{"no split \"" + selection.split + "\"; there are tune, last, report and figure7"};
+  const Split& split = split_named(selection.split);
   RunFile file{options.out, options.header(), shard_name(selection.split, selection.shard, selection.shards)};
   for (const ClassSetting& setting : class_settings()) {
     for (const std::string& name : selected_parts(setting, selection)) {
       std::optional<PartRun> part;  // trained when the first scene asks for it
-      for (std::size_t number = selection.from; number < std::min(selection.to, split->scenes()); ++number) {
+      for (std::size_t number = selection.from; number < std::min(selection.to, split.scenes()); ++number) {
         if (number % selection.shards != selection.shard) continue;
         std::vector<std::pair<SceneLine, const Contender*>> missing;
         for (const Contender& contender : contenders) {
@@ -219,7 +217,7 @@ void run(const RunOptions& options, const RunSelection& selection, const std::ve
           line.detector = contender.name;
           line.scanner = setting.name;
           line.part = name;
-          line.split = split->name;
+          line.split = split.name;
           line.number = number;
           if (number < contender.scenes && !file.has(line)) missing.emplace_back(std::move(line), &contender);
         }
@@ -227,7 +225,7 @@ void run(const RunOptions& options, const RunSelection& selection, const std::ve
         // Who comes first finds cold caches: each has its turn.
         std::ranges::rotate(missing, missing.begin() + static_cast<std::ptrdiff_t>(number % missing.size()));
         if (!part) part.emplace(options, setting, name);
-        part->scene(*split, number, missing, [&](const SceneLine& line) { file.write(line); });
+        part->scene(split, number, missing, [&](const SceneLine& line) { file.write(line); });
       }
     }
   }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <set>
-#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -12,9 +11,7 @@
 
 namespace binpick::bench {
 void settle(const std::string& piles, const RunSelection& selection, std::size_t alarm_count) {
-  const Split* split = find_split(selection.split);
-  if (split == nullptr)
-    throw std::runtime_error{"no split \"" + selection.split + "\"; there are tune, last, report and figure7"};
+  const Split& split = split_named(selection.split);
   std::vector<std::pair<ScenePart, std::uint64_t>> missing;
   std::set<std::string> known;
   const auto add = [&](const ScenePart& part, std::uint64_t pile) {
@@ -25,13 +22,15 @@ void settle(const std::string& piles, const RunSelection& selection, std::size_t
     const std::vector<std::string> names = selected_parts(setting, selection);
     for (const std::string& name : names) {
       const ScenePart part = scene_part(setting.scanner, name);
-      for (std::size_t k = selection.from; k < std::min(selection.to, split->scenes()); ++k)
-        add(part, split->scene(k).pile);
+      for (std::size_t k = selection.from; k < std::min(selection.to, split.scenes()); ++k)
+        add(part, split.scene(k).pile);
     }
     const std::string alarms = "alarms-" + selection.split;
-    if (!is_alarm_split(alarms) || names.empty() || !selection.parts.empty()) continue;
+    if (!is_alarm_split(alarms) || names.empty()) continue;
     for (std::size_t k = 0; k < alarm_count * kAlarmKinds.size(); ++k)
-      if (const AlarmScene alarm = alarm_scene(setting, alarms, k); !alarm.empty()) add(alarm.there, alarm.id.pile);
+      if (const AlarmScene alarm = alarm_scene(setting, alarms, k);
+          !alarm.empty() && std::ranges::find(names, alarm.wanted) != names.end())
+        add(alarm.there, alarm.id.pile);
   }
   for (std::size_t k = selection.shard; k < missing.size(); k += selection.shards) {
     const auto& [part, pile] = missing[k];
