@@ -1,5 +1,6 @@
 #include "tests/emulators/scanner/lms400_device.hpp"
 
+#include <algorithm>
 #include <gtest/gtest.h>
 #include <string>
 #include <vector>
@@ -29,7 +30,7 @@ struct Terminal {
     std::vector<std::string> texts;
     const TimePoint end = now + duration;
     while (device.deadline() && *device.deadline() <= end) {
-      now = *device.deadline();
+      now = std::max(now, *device.deadline());
       device.on_deadline(now);
       const Bytes out = device.take_output();
       for (ByteView rest = out; !rest.empty();) {
@@ -135,6 +136,19 @@ TEST(Lms400Device, StreamsInEachFormatUntilStopped) {
     terminal.run_for(1s);
     EXPECT_EQ(terminal.telegrams.size(), count);
   }
+}
+
+TEST(Lms400Device, LosesScansRatherThanSendsThemLate) {
+  Terminal terminal;
+  terminal.say("sMN mLRreqdata 20", 1s);
+  const auto counted = [&] { return terminal.telegrams.back().counter(); };
+  const std::size_t before = terminal.telegrams.size();
+  const int last = counted();
+  EXPECT_GT(before, 300U);
+  terminal.now += 50ms;  // the machine was busy
+  terminal.run_for(1ms);
+  EXPECT_LE(terminal.telegrams.size(), before + 2);
+  EXPECT_NEAR(counted() - last, 18, 1);
 }
 
 TEST(Lms400Device, CommandWithAWrongChecksumIsDroppedOrTakenAsSet) {
