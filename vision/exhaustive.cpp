@@ -16,7 +16,7 @@ constexpr std::size_t kMoreSamples = 32;
 constexpr int kExplainedMin = 4;
 constexpr int kContradictedMax = 8;
 /// So many pass the first test in all; shared evenly, lest a wide plateau takes the time of all others.
-constexpr double kPassedMax = 60'000, kPassedMin = 300;
+constexpr double kPassedMax = 36'000, kPassedMin = 100;
 constexpr std::size_t kBlockRows = 2048;
 
 bool stronger(const Standing& a, const Standing& b) {
