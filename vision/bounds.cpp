@@ -7,6 +7,8 @@
 namespace binpick::vision {
 namespace {
 constexpr double kFloorGateDiameters = 0.03, kWallGateDiameters = 0.04;
+/// Floors and walls are bent and dirty.
+constexpr double kContentGateDiameters = 0.1;
 
 bool has_walls(const SupplyBox& supply) { return supply.size_mm.x() > 0 && supply.size_mm.y() > 0; }
 
@@ -30,11 +32,26 @@ float floor_of(const Scene& scene, const SupplyBox& supply) {
 
 Bounds::Bounds(const Scene& scene, const SupplyBox& supply, double diameter_mm)
     : floor_mm_{floor_of(scene, supply)},
+      content_from_mm_{floor_mm_ +
+                       static_cast<float>(std::max(3 * scene.noise_mm, kContentGateDiameters * diameter_mm))},
       depth_mm_{static_cast<float>(std::max(3 * scene.noise_mm, kFloorGateDiameters * diameter_mm))},
-      walls_mm_{Eigen::Array2f::Constant(std::numeric_limits<float>::infinity())} {
-  if (has_walls(supply))
-    walls_mm_ =
-        (0.5 * supply.size_mm.head<2>().array() + kWallGateDiameters * diameter_mm + 2 * scene.pixel_mm).cast<float>();
+      walls_mm_{Eigen::Array2f::Constant(std::numeric_limits<float>::infinity())},
+      inner_mm_{Eigen::Array2d::Constant(std::numeric_limits<double>::infinity())} {
+  if (!has_walls(supply)) return;
+  const Eigen::Array2d half_mm = 0.5 * supply.size_mm.head<2>().array();
+  walls_mm_ = (half_mm + kWallGateDiameters * diameter_mm + 2 * scene.pixel_mm).cast<float>();
+  inner_mm_ = half_mm - std::max(2 * scene.pixel_mm, kContentGateDiameters * diameter_mm);
+}
+
+Grid<std::uint8_t> Bounds::content(const Scene& scene) const {
+  Grid<std::uint8_t> content = Grid<std::uint8_t>::Zero(scene.rows(), scene.cols());
+  const auto inside = [&](int index, int axis) {
+    return std::abs(scene.origin_mm[axis] + index * scene.pixel_mm) < inner_mm_[axis];
+  };
+  for (int r = 0; r < scene.rows(); ++r)
+    for (int c = 0; c < scene.cols(); ++c)  // not-a-number is not higher
+      content(r, c) = inside(c, 0) && inside(r, 1) && scene.z_mm(r, c) > content_from_mm_;
+  return content;
 }
 
 std::string Bounds::against(const Pose& pose, const std::vector<Eigen::Vector3f>& vertices_mm) const {

@@ -165,7 +165,7 @@ std::vector<Eigen::Matrix3f> Finisher::principal_turns() const {
 }
 
 void Finisher::weigh_turns(std::vector<Candidate*> candidates, const std::function<bool(const Pose&)>& possible) const {
-  constexpr std::array<double, 13> kFanDeg{3, 6, 10, 15, 22, 32, 45, 60, 80, 105, 130, 155, 180};
+  constexpr std::array<double, 9> kFanDeg{3, 6, 11, 19, 32, 52, 85, 130, 180};
   std::vector<Fan> fans;
   for (const Principal& principal : principal_axes()) {
     if (!principal.nearly_round) continue;
@@ -201,20 +201,21 @@ void Finisher::add_loose(Candidate& candidate, const Fan& fan, double variance_r
 
 void Finisher::weigh_turns(Candidate& candidate, const Fan& fan, const std::function<bool(const Pose&)>& possible,
                            Template& drawn) const {
-  /// By how much noise makes evidence differ, over the root of the pixels.
+  // By how much noise makes evidence differ, over the root of the pixels.
   constexpr double kEvidenceNoise = 0.5;
   const auto turned_by = [&](double angle) {
     const Eigen::Matrix3f R = candidate.pose.R * Eigen::AngleAxisd(angle, fan.axis).toRotationMatrix().cast<float>();
     return Pose{R, candidate.pose.R * centroid_ + candidate.pose.t - R * centroid_};
   };
   std::vector<double> evidence(fan.angles_rad.size());
-  const auto look = [&](int every) {
+  // Every second pixel tells it, in a quarter of the time.
+  const int every = std::min(2, glance_every(scene_, part_.diameter_mm));
+  const auto look = [&] {
     for (std::size_t k = 0; k < evidence.size(); ++k)
       evidence[k] = static_cast<double>(glance(scene_, rasteriser_, turned_by(fan.angles_rad[k]), drawn, every));
     return static_cast<std::size_t>(std::max_element(evidence.begin(), evidence.end()) - evidence.begin());
   };
-  // Every second pixel tells whether another turn is better, in a quarter of the time.
-  std::size_t best = look(std::min(2, glance_every(scene_, part_.diameter_mm)));
+  std::size_t best = look();
   for (int again = 0; again < 2 && fan.angles_rad[best] != 0; ++again) {
     const Candidate other = finished(turned_by(fan.angles_rad[best]), drawn);
     if (other.test.evidence <= candidate.test.evidence || !possible(other.pose)) break;
@@ -223,9 +224,10 @@ void Finisher::weigh_turns(Candidate& candidate, const Fan& fan, const std::func
     candidate.information = other.information;
     // What other poses say of it stays.
     Evidence told = other.evidence;
-    for (const Clue clue : {Clue::Claimed, Clue::Rival, Clue::Company}) told[clue] = candidate.evidence[clue];
+    for (const Clue clue : {Clue::Claimed, Clue::Rival, Clue::Extent, Clue::Known})
+      told[clue] = candidate.evidence[clue];
     candidate.evidence = told;
-    best = look(1);
+    best = look();
   }
   if (evidence[best] <= 0) return;
   double weights = 0, squares = 0;

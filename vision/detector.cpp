@@ -32,7 +32,7 @@ constexpr std::size_t kCrowdMax = 10, kRenderedCrowdMax = 3;
 constexpr float kFirstLookShare = 0.05F, kLastLookShare = -0.2F;
 /// A place is settled by a pose this sure; what explains less than this share of what it does is not looked at again.
 constexpr double kSettledScore = 0.9;
-constexpr float kSettledShare = 0.85F;
+constexpr float kSettledShare = 0.95F;
 constexpr double kSparseToleranceDiameters = 0.035;
 /// A rotation of a grid of 10 000 is up to nine degrees off, which moves the lowest point against the highest by so
 /// much: a narrower gate silently loses what lies flat on the floor.
@@ -372,6 +372,7 @@ class Detecting {
     options.centroid_mm = centroid_;
     options.threads = options_.threads;
     options.score_min = kScoreMin;
+    options.content = bounds_->content(scene_);
     options.outside = [this](const Pose& pose) { return against(pose); };
     options.rooms = with("rooms");
     options.explain_away = with("explain away");

@@ -32,7 +32,7 @@ Evidence evidence_of(const DenseTest& test) {
   e[Clue::Normals] = test.normal_agreement;
   e[Clue::Curvature] = test.bend_agreement;
   e[Clue::Fit] = test.fit;
-  e[Clue::Company] = 0.5F;
+  e[Clue::Known] = 0.5F;
   e[Clue::Size] = std::log10(static_cast<float>(std::max(1, test.explained)));
   return e;
 }
@@ -70,18 +70,18 @@ double against_rival(double rival, double scale) { return 1 / (1 + std::exp((riv
 
 double score_by_itself(const Evidence& evidence) { return logistic(kWeights, terms_of(evidence)); }
 
-std::array<double, 3> second_terms(double by_itself, double company) {
+std::array<double, kSecondTerms> second_terms(double by_itself, double known) {
   const auto logit = [](double p, double least) {
     const double q = std::clamp(p, least, 1 - least);
     return std::log(q / (1 - q));
   };
-  // The best of many is never quite impossible, and one that is sure is sure enough.
-  return {1, logit(by_itself, 1e-6), logit(company, 0.1)};
+  // Of a supply that is the part's, more than this share is known, however deep others lie.
+  constexpr double kKnownEnough = 0.4;
+  return {1, logit(by_itself, 1e-6), std::min(logit(known, 0.1), logit(kKnownEnough, 0.1))};
 }
 
 double score_of(const Evidence& evidence) {
   return against_rival(static_cast<double>(evidence[Clue::Rival]), kRivalScale) *
-         logistic(kSecondWeights,
-                  second_terms(score_by_itself(evidence), static_cast<double>(evidence[Clue::Company])));
+         logistic(kSecondWeights, second_terms(score_by_itself(evidence), static_cast<double>(evidence[Clue::Known])));
 }
 }  // namespace binpick::vision

@@ -9,7 +9,8 @@
 
 /// How sure the evidence makes us.
 namespace binpick::vision {
-/// All clues but the last four, which other poses and the refinement tell; Clue::Company is a half.
+/// All clues but Clue::Looseness, which refinement tells, and those after it, which other poses do: nothing claimed, no
+/// rival, half of the supply known.
 Evidence evidence_of(const DenseTest& test);
 
 /// What is linear in the score: the clues, bent. Calibration fits the weights of these.
@@ -22,26 +23,10 @@ double against_rival(double rival, double scale);
 
 /// Probability that the pose is right, as far as it shows itself: logistic in terms_of().
 double score_by_itself(const Evidence& evidence);
-/// Clue::Company, from the others' score_by_itself(): a supply in which nothing else looks like the part rarely holds
-/// one.
-class Company {
- public:
-  void add(double by_itself) {
-    second_ = std::max(second_, std::min(best_, by_itself));
-    best_ = std::max(best_, by_itself);
-    ++count_;
-  }
-  /// Of one that was added.
-  double of(double by_itself) const { return count_ < 2 ? 0.5 : by_itself < best_ ? best_ : second_; }
-  /// Of one that was not.
-  double of_another() const { return count_ == 0 ? 0.5 : best_; }
-
- private:
-  double best_ = 0, second_ = 0;
-  std::size_t count_ = 0;
-};
-/// What is linear in the second step: 1, the logit of score_by_itself() and that of the company.
-std::array<double, 3> second_terms(double by_itself, double company);
+/// What is linear in the second step, since a supply that is mostly something else rarely holds the part: 1, and the
+/// logits of score_by_itself() and of what is known of the supply.
+inline constexpr std::size_t kSecondTerms = 3;
+std::array<double, kSecondTerms> second_terms(double by_itself, double known);
 
 /// Probability that the pose is right: logistic in second_terms(), times against_rival(). The weights come from
 /// simulated scenes (bench_scenes calibrate, which writes score_weights.inc).

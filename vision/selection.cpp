@@ -37,8 +37,8 @@ std::string what_speaks_against(const DenseTest& test) {
   return "too little evidence";
 }
 
-/// Columns in which both bodies claim the same room, over the columns of the smaller.
-double shared_room(const Template& a, const Template& b, float depth_mm) {
+/// Columns in which both bodies claim the same room.
+int shared_columns(const Template& a, const Template& b, float depth_mm) {
   const int row_first = std::max(a.row0, b.row0), row_last = std::min(a.row0 + a.rows, b.row0 + b.rows);
   const int col_first = std::max(a.col0, b.col0), col_last = std::min(a.col0 + a.cols, b.col0 + b.cols);
   if (row_first >= row_last || col_first >= col_last) return 0;
@@ -49,17 +49,21 @@ double shared_room(const Template& a, const Template& b, float depth_mm) {
       if (a.triangle[i] < 0 || b.triangle[j] < 0) continue;
       shared += std::min(a.top_mm[i], b.top_mm[j]) - std::max(a.bottom_mm[i], b.bottom_mm[j]) > depth_mm;
     }
-  const auto columns = [](const Template& t) {
-    return std::count_if(t.triangle.begin(), t.triangle.end(), [](std::int32_t k) { return k >= 0; });
-  };
-  return static_cast<double>(shared) /
-         static_cast<double>(std::max<std::ptrdiff_t>(1, std::min(columns(a), columns(b))));
+  return shared;
 }
+
 /// A candidate on the picture.
 struct Shown {
   Template drawn;
   std::vector<PixelState> states;  ///< Empty: not drawn yet.
+  std::ptrdiff_t columns = 0;      ///< Pixels of the silhouette.
 };
+
+/// Columns in which both bodies claim the same room, over the columns of the smaller.
+double shared_room(const Shown& a, const Shown& b, float depth_mm) {
+  const auto smaller = std::max<std::ptrdiff_t>(1, std::min(a.columns, b.columns));
+  return static_cast<double>(shared_columns(a.drawn, b.drawn, depth_mm)) / static_cast<double>(smaller);
+}
 
 class Selecting {
  public:
@@ -70,7 +74,8 @@ class Selecting {
         symmetry_{symmetry},
         options_{options},
         candidates_{std::move(candidates)},
-        owner_{Grid<std::int32_t>::Constant(scene.rows(), scene.cols(), -1)} {
+        owner_{Grid<std::int32_t>::Constant(scene.rows(), scene.cols(), -1)},
+        content_{std::max(1.0F, options.content.cast<float>().sum())} {
     std::stable_sort(candidates_.begin(), candidates_.end(),
                      [](const Candidate& a, const Candidate& b) { return a.test.evidence > b.test.evidence; });
     for (const Candidate& c : candidates_) {
@@ -86,7 +91,7 @@ class Selecting {
   std::vector<Selected> run() {
     show_likely();
     for (std::size_t i = 0; i < candidates_.size(); ++i) judge(i);
-    tell_company();
+    tell_known();
     for (Selected& entry : all_) entry.score = score_of(entry.candidate.evidence);
     std::stable_sort(all_.begin(), all_.end(), [](const Selected& a, const Selected& b) { return a.score > b.score; });
     return std::move(all_);
@@ -111,6 +116,8 @@ class Selecting {
     const Pose& pose = candidates_[i].pose;
     part_.draw(pose.R, pose.t, scene_.pixel_mm, scene_.origin_mm, shown_[i].drawn, options_.rooms);
     compare(scene_, part_, pose, shown_[i].drawn, shown_[i].states);
+    const std::vector<std::int32_t>& triangles = shown_[i].drawn.triangle;
+    shown_[i].columns = std::count_if(triangles.begin(), triangles.end(), [](std::int32_t k) { return k >= 0; });
   }
 
   /// Those that will most likely be asked for, by all threads; the others are drawn when they are.
@@ -129,7 +136,7 @@ class Selecting {
     const Template& t = shown.drawn;
     for (int r = 0; r < t.rows; ++r)
       for (int c = 0; c < t.cols; ++c)
-        if (shown.states[t.at(r, c)] == PixelState::Explained) work(owner_(r + t.row0, c + t.col0));
+        if (shown.states[t.at(r, c)] == PixelState::Explained) work((r + t.row0) * scene_.cols() + c + t.col0);
   }
 
   void judge(std::size_t i) {
@@ -152,23 +159,28 @@ class Selecting {
         entry.reason = what_speaks_against(entry.candidate.test);
     }
     if (entry.reason.empty()) {
-      for_explained(shown_[i], [&](std::int32_t& owner) {
-        if (owner < 0) owner = static_cast<std::int32_t>(standing_.size());
+      std::size_t explained = 0;
+      for_explained(shown_[i], [&](std::int32_t pixel) {
+        std::int32_t& owner = owner_.data()[pixel];
+        if (owner >= 0) return;
+        owner = static_cast<std::int32_t>(standing_.size());
+        ++explained;
+        content_ += static_cast<float>(1 - options_.content.data()[pixel]);
       });
+      entry.candidate.evidence[Clue::Extent] = static_cast<float>(explained);
       standing_.push_back({i, all_.size()});
     }
     all_.push_back(std::move(entry));
   }
 
-  void tell_company() {
-    Company company;
-    for (const Selected& entry : all_)
-      if (!entry.overshadowed && !entry.outside) company.add(score_by_itself(entry.candidate.evidence));
+  void tell_known() {
+    double known = 0;
     for (Selected& entry : all_) {
-      Evidence& evidence = entry.candidate.evidence;
-      evidence[Clue::Company] = static_cast<float>(
-          entry.overshadowed || entry.outside ? company.of_another() : company.of(score_by_itself(evidence)));
+      float& extent = entry.candidate.evidence[Clue::Extent];
+      extent /= content_;
+      if (extent > 0) known += score_by_itself(entry.candidate.evidence) * static_cast<double>(extent);
     }
+    for (Selected& entry : all_) entry.candidate.evidence[Clue::Known] = static_cast<float>(known);
   }
 
   void add_rival(const Standing& standing, const Selected& entry) {
@@ -181,7 +193,8 @@ class Selecting {
   void compare_with_standing(std::size_t i, Selected& entry) {
     std::vector<int> claims(standing_.size(), 0);
     int explained = 0, claimed = 0;
-    for_explained(shown_[i], [&](const std::int32_t& owner) {
+    for_explained(shown_[i], [&](std::int32_t pixel) {
+      const std::int32_t owner = owner_.data()[pixel];
       ++explained;
       if (owner < 0) return;
       ++claimed;
@@ -192,7 +205,7 @@ class Selecting {
       const float share = static_cast<float>(claims[s]) / static_cast<float>(std::max(1, explained));
       if (share > kRivalShare) add_rival(standing_[s], entry);
       if (options_.rooms && entry.reason.empty() && share <= kClaimedMax &&
-          shared_room(shown_[standing_[s].candidate].drawn, shown_[i].drawn, room_mm) > kInsideMax)
+          shared_room(shown_[standing_[s].candidate], shown_[i], room_mm) > kInsideMax)
         entry.reason = "stands inside a better one";
     }
     Evidence& evidence = entry.candidate.evidence;
@@ -212,6 +225,7 @@ class Selecting {
   std::vector<Standing> standing_;
   std::vector<Selected> all_;
   Grid<std::int32_t> owner_;  // of each pixel: who of those standing explains it first
+  float content_;             // pixels: of the contents, and what those standing explain besides
 };
 }  // namespace
 

@@ -16,7 +16,7 @@ struct Candidate {
   Matrix6 information = Matrix6::Zero();
   Eigen::Matrix3d loose_turn_rad2 = Eigen::Matrix3d::Zero();  ///< More covariance of the rotation, supply axes: turns
                                                               ///< that the picture hardly tells.
-  Evidence evidence;  ///< Without Clue::Claimed and Clue::Rival before select().
+  Evidence evidence;  ///< What other poses tell of it (Clue::Claimed and those after it) comes with select().
 };
 
 struct SelectOptions {
@@ -26,6 +26,7 @@ struct SelectOptions {
   Eigen::Vector3f centroid_mm = Eigen::Vector3f::Zero();  ///< Object frame.
   int threads = 2;
   double score_min = 0.1;
+  Grid<std::uint8_t> content;  ///< Of each pixel of the scene, whether it is 1: something lies there. Or 0.
   std::function<std::string(const Pose&)> outside;  ///< Why the part cannot be there at all; empty: it can.
   bool rooms = true;                                ///< Two bodies do not share room.
   bool explain_away = true;                         ///< A pixel is explained once.

@@ -17,7 +17,7 @@ namespace binpick::bench {
 namespace {
 constexpr double kRidge = 0.3;
 /// A wrong pose where nothing is to be found is worse than one among many right ones.
-constexpr double kAlarmWeight = 2;
+constexpr double kAlarmWeight = 4;
 constexpr int kSteps = 100;
 /// No wider: a rival two per cent short of an object that lies open is no coin.
 constexpr std::array kRivalScales{0.0005, 0.001, 0.002, 0.003, 0.004, 0.006, 0.008};
@@ -27,12 +27,16 @@ struct Example {
   double rival = 0;
   bool right = false;
   double weight = 1;
+  double extent = 0;
   std::size_t scene = 0;
 };
 
 Example example_of(const vision::Evidence& evidence, bool right) {
   const auto terms = vision::terms_of(evidence);
-  return {Eigen::Map<const Eigen::VectorXd>(terms.data(), vision::kTerms), evidence[vision::Clue::Rival], right};
+  return {.terms = Eigen::Map<const Eigen::VectorXd>(terms.data(), vision::kTerms),
+          .rival = evidence[vision::Clue::Rival],
+          .right = right,
+          .extent = evidence[vision::Clue::Extent]};
 }
 
 bool overshadowed(const RejectionLine& rejection) {
@@ -47,9 +51,9 @@ void add_scene(const SceneLine& scene, const Judge& judge, std::size_t number, s
   for (std::size_t i = 0; i < scene.detections.size(); ++i) {
     const int truth = found.truth[i];
     if (truth >= 0) known.insert(truth);
-    // Of what cannot be told, only the judge is indifferent.
-    if (truth >= 0 && !scene.truths[static_cast<std::size_t>(truth)].told) continue;
     examples.push_back(example_of(scene.detections[i].evidence, found.verdict[i] != Verdict::Wrong));
+    // Of what cannot be told, the judge is indifferent: it counts for the others.
+    if (truth >= 0 && !scene.truths[static_cast<std::size_t>(truth)].told) examples.back().weight = 0;
   }
   for (const RejectionLine& r : scene.rejected) {
     if (overshadowed(r)) continue;
@@ -60,13 +64,14 @@ void add_scene(const SceneLine& scene, const Judge& judge, std::size_t number, s
           judge.measure(scene.truths[k].told).distance_mm(r.T_supply_object, scene.truths[k].T_supply_object);
       if (d < least) least = d, nearest = static_cast<int>(k);
     }
-    // Once more what is found already, or what cannot be told.
-    if (nearest >= 0 && (known.contains(nearest) || !scene.truths[static_cast<std::size_t>(nearest)].told)) continue;
     examples.push_back(example_of(r.evidence, nearest >= 0));
+    // Once more what is found already, or what cannot be told.
+    if (nearest >= 0 && (known.contains(nearest) || !scene.truths[static_cast<std::size_t>(nearest)].told))
+      examples.back().weight = 0;
   }
   for (std::size_t i = before; i < examples.size(); ++i) {
     examples[i].scene = number;
-    if (is_alarm_split(scene.split)) examples[i].weight = kAlarmWeight;
+    if (is_alarm_split(scene.split)) examples[i].weight *= kAlarmWeight;
   }
 }
 
@@ -108,14 +113,13 @@ Fit fitted(const std::vector<Example>& examples, double rival_scale) {
   }
   return fit;
 }
-/// The same poses as the second step sees them: by themselves, and in the company of their scene's others.
-std::vector<Example> in_company(const std::vector<Example>& examples, const Fit& first) {
-  std::map<std::size_t, vision::Company> scenes;
-  for (const Example& e : examples) scenes[e.scene].add(by_itself(first, e));
+/// The same poses as the second step sees them: by themselves, and by what all of their scene explain.
+std::vector<Example> among_others(const std::vector<Example>& examples, const Fit& first) {
+  std::map<std::size_t, double> known;
+  for (const Example& e : examples) known[e.scene] += by_itself(first, e) * e.extent;
   std::vector<Example> second = examples;
   for (Example& e : second) {
-    const double own = by_itself(first, e);
-    const auto terms = vision::second_terms(own, scenes[e.scene].of(own));
+    const auto terms = vision::second_terms(by_itself(first, e), known[e.scene]);
     e.terms = Eigen::Map<const Eigen::VectorXd>(terms.data(), static_cast<Eigen::Index>(terms.size()));
   }
   return second;
@@ -143,11 +147,12 @@ void calibrate(const std::vector<std::string>& folders) {
   Fit best;
   for (const double scale : kRivalScales)
     if (const Fit fit = fitted(examples, scale); best.rival_scale == 0 || fit.loss < best.loss) best = fit;
-  const std::vector<Example> second = in_company(examples, best);
+  const std::vector<Example> second = among_others(examples, best);
   const Fit last = fitted(second, best.rival_scale);
   std::vector<Believed> believed;
   double right = 0;
   for (const Example& e : second) {
+    if (e.weight == 0) continue;
     believed.push_back({probability(last, e), e.right});
     right += e.right;
   }
@@ -155,6 +160,6 @@ void calibrate(const std::vector<std::string>& folders) {
               examples.size(), scenes, right, best.loss, last.loss, calibration_error(believed));
   std::printf("constexpr double kRivalScale = %g;\n", best.rival_scale);
   print("kWeights", "kTerms", best.weights);
-  print("kSecondWeights", "3", last.weights);
+  print("kSecondWeights", "kSecondTerms", last.weights);
 }
 }  // namespace binpick::bench

@@ -78,6 +78,26 @@ TEST(Detector, AHalfHiddenObjectIsFoundAndSaysSo) {
   }
 }
 
+TEST(Detector, TellsHowMuchOfTheSupplyIsThePart) {
+  const std::vector<Eigen::Isometry3d> truth{pose(-180, 0, 0, 0.3)};
+  DepthImage image = scenes::image_of(bracket_base().mesh(), truth, 4);
+  const auto first = [](const DetectionReport& report) {
+    return report.detections.empty() ? Detection{} : report.detections.front();
+  };
+  const Detection alone = first(detect_in(image));
+  EXPECT_GT(alone.score, 0.9);
+  EXPECT_GT(alone.evidence[Clue::Extent], 0.9F);
+  EXPECT_GT(alone.evidence[Clue::Known], 0.8F);
+  const Eigen::Index half = image.z_mm.cols() / 2;
+  image.z_mm.rightCols(half) += 10;  // a sheet of board
+  EXPECT_GT(first(detect_in(image)).evidence[Clue::Known], 0.8F);
+  image.z_mm.rightCols(half) += 70;  // a box
+  const Detection beside = first(detect_in(image));
+  EXPECT_LT(beside.evidence[Clue::Extent], 0.2F);
+  EXPECT_LT(beside.evidence[Clue::Known], 0.2F);
+  EXPECT_LT(beside.score, alone.score - 0.01);
+}
+
 // From below the bracket shows a plain rectangle: half a turn about the vertical cannot be told.
 TEST(Detector, WhatTwoPosesExplainAlikeIsNotBelieved) {
   const DetectionReport report =
