@@ -1,7 +1,9 @@
 #include "vision/maxima.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "vision/team.hpp"
@@ -13,18 +15,34 @@ constexpr double kPlateauDiameters = 0.02;
 constexpr double kGridDiameters = 0.09;
 /// Steeper than this between two pixels is another surface.
 constexpr float kSlopeMax = 1.0F;
+constexpr double kSpikeSds = 1.5;
 
 struct Peak {
   int row, col;
   float z;
 };
 
-bool is_local_maximum(const Scene& scene, int row, int col, int radius) {
-  const float z = scene.z_mm(row, col);
+/// Of a pixel and its neighbours the third highest, if that is lower: what noise puts on top is no surface, and a
+/// ridge goes on to both sides.
+float without_spike(const Grid<float>& z_mm, int row, int col) {
+  std::array<float, 3> highest;
+  highest.fill(-std::numeric_limits<float>::infinity());
+  for (int r = std::max(0, row - 1); r <= std::min(static_cast<int>(z_mm.rows()) - 1, row + 1); ++r)
+    for (int c = std::max(0, col - 1); c <= std::min(static_cast<int>(z_mm.cols()) - 1, col + 1); ++c) {
+      float z = z_mm(r, c);
+      if (std::isnan(z)) continue;
+      for (float& known : highest)
+        if (z > known) std::swap(z, known);
+    }
+  return std::min(z_mm(row, col), highest.back());
+}
+
+bool is_local_maximum(const Scene& scene, const Grid<float>& z_mm, int row, int col, int radius) {
+  const float z = z_mm(row, col);
   const auto pixel_mm = static_cast<float>(scene.pixel_mm);
   for (int r = std::max(0, row - radius); r <= std::min(scene.rows() - 1, row + radius); ++r)
     for (int c = std::max(0, col - radius); c <= std::min(scene.cols() - 1, col + radius); ++c) {
-      const float rise = scene.z_mm(r, c) - z;
+      const float rise = z_mm(r, c) - z;
       if (!(rise > 0)) continue;
       const auto distance = pixel_mm * std::hypot(static_cast<float>(r - row), static_cast<float>(c - col));
       if (rise <= scene.jump_mm + kSlopeMax * distance) return false;
@@ -75,12 +93,21 @@ void add_anchors(const Scene& scene, const std::vector<Peak>& plateau, double ce
 std::vector<Eigen::Vector3f> find_maxima(const Scene& scene, const MaximaOptions& options) {
   const int radius =
       std::max(2, static_cast<int>(std::lround(kWindowDiameters * options.diameter_mm / scene.pixel_mm)));
+  Grid<float> z_mm = scene.z_mm;
+  // Only where noise from pixel to pixel is as steep as surfaces are: a fine scanner's narrow tops are real.
+  const bool spiky = kSpikeSds * scene.noise_mm > static_cast<double>(kSlopeMax) * scene.pixel_mm;
+  const std::size_t rows_to_mend = spiky ? static_cast<std::size_t>(scene.rows()) : 0;
+  share(options.threads, rows_to_mend, Deadline{}, [&](std::size_t row, int) {
+    const int r = static_cast<int>(row);
+    for (int c = 0; c < scene.cols(); ++c)
+      if (scene.z_mm(r, c) >= options.z_min_mm) z_mm(r, c) = without_spike(scene.z_mm, r, c);
+  });
   std::vector<std::vector<Peak>> of_row(static_cast<std::size_t>(scene.rows()));
   share(options.threads, of_row.size(), Deadline{}, [&](std::size_t row, int) {
     const int r = static_cast<int>(row);
     for (int c = 0; c < scene.cols(); ++c) {
-      const float z = scene.z_mm(r, c);
-      if (z >= options.z_min_mm && is_local_maximum(scene, r, c, radius)) of_row[row].push_back({r, c, z});
+      const float z = z_mm(r, c);
+      if (z >= options.z_min_mm && is_local_maximum(scene, z_mm, r, c, radius)) of_row[row].push_back({r, c, z});
     }
   });
   std::vector<Peak> peaks;
@@ -99,7 +126,7 @@ std::vector<Eigen::Vector3f> find_maxima(const Scene& scene, const MaximaOptions
       const Peak at = plateau[i];
       for (int r = std::max(0, at.row - 1); r <= std::min(scene.rows() - 1, at.row + 1); ++r)
         for (int c = std::max(0, at.col - 1); c <= std::min(scene.cols() - 1, at.col + 1); ++c) {
-          const float z = scene.z_mm(r, c);
+          const float z = z_mm(r, c);
           if (taken(r, c) || !(std::abs(z - peak.z) <= depth)) continue;
           taken(r, c) = 1;
           plateau.push_back({r, c, z});
