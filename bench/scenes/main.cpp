@@ -7,6 +7,7 @@
 #include "bench/scenes/ablation.hpp"
 #include "bench/scenes/alarms.hpp"
 #include "bench/scenes/calibrate.hpp"
+#include "bench/scenes/conveyor.hpp"
 #include "bench/scenes/figure7.hpp"
 #include "bench/scenes/memory.hpp"
 #include "bench/scenes/noise_truth.hpp"
@@ -130,6 +131,14 @@ int main(int argc, char** argv) {
   CLI::App* search_command = comparing("search", "votes beside the exhaustive search");
   CLI::App* ablation_command = comparing("ablation", "what each addition to the method brings");
 
+  CLI::App* conveyor_command = app.add_subcommand("conveyor", "objects that lie by themselves on a belt");
+  std::size_t belt_scenes = 100;
+  add_run_options(*conveyor_command, options);
+  add_classes(*conveyor_command, selection);
+  add_parts(*conveyor_command, selection);
+  conveyor_command->add_option("--scenes", belt_scenes, "of each part");
+  add_shard(*conveyor_command, selection);
+
   CLI::App* table_command = app.add_subcommand("table", "print the figures of a run");
   table_command->add_option("folder", folder, "of the run")->required();
   std::vector<std::string> folders;
@@ -145,6 +154,7 @@ int main(int argc, char** argv) {
     if (*figure7_command) figure7(options, count, selection.shard, selection.shards);
     if (*alarms_command) alarms(options, selection, alarm_count);
     if (*settle_command) settle(options.piles, selection, alarm_count);
+    if (*conveyor_command) conveyor(options, selection, belt_scenes);
     if (*search_command) search(options, selection, scenes);
     if (*ablation_command) ablation(options, selection, scenes);
     if (*noise_command) print_noise_truth(cloud);

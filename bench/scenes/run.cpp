@@ -134,11 +134,12 @@ Scene make_scene(const ScenePart& part, const std::vector<ObjectPose>& poses, co
           measured_points(setting, lines, ideal, world, {id.noise, bias_mm})};
 }
 
-vision::KnowledgeBase knowledge_base_of(const ScenePart& part, const std::string& file) {
+vision::KnowledgeBase knowledge_base_of(const ScenePart& part, const std::string& file, vision::Picking picking) {
   if (auto known = vision::KnowledgeBase::open(file)) return std::move(*known);
   vision::PartOptions options;
   options.name = part.body.name;
   options.scanner = part.scanner;
+  options.picking = picking;
   vision::TrainingSummary summary;
   auto trained = vision::train(part.body.mesh, options, {}, &summary);
   if (!trained) throw std::runtime_error{trained.error().text};

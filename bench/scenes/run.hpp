@@ -43,7 +43,8 @@ Scene make_scene(const ScenePart& part, const std::vector<ObjectPose>& poses, co
                  double sparse = 1);
 
 /// Trained for the class, or read from `file` where it is.
-vision::KnowledgeBase knowledge_base_of(const ScenePart& part, const std::string& file);
+vision::KnowledgeBase knowledge_base_of(const ScenePart& part, const std::string& file,
+                                        vision::Picking picking = vision::Picking::Bin);
 
 vision::DepthImage depth_image_of(const std::vector<Eigen::Vector3f>& points, const vision::KnowledgeBase& base,
                                   const vision::SupplyBox& supply);
