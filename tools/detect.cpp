@@ -18,6 +18,7 @@ namespace {
 struct DetectArguments {
   std::string part, scene, json, image;
   int max = 0, repeat = 1, threads = 2;
+  std::vector<double> supply_mm;  ///< Three numbers; empty: unknown.
   bool votes = false;
   int deadline_ms = 0;
 };
@@ -118,17 +119,20 @@ int run(const DetectArguments& arguments) {
   options.detections_max = arguments.max;
   if (arguments.deadline_ms > 0) options.deadline = std::chrono::milliseconds{arguments.deadline_ms};
 
+  vision::SupplyBox supply;
+  if (!arguments.supply_mm.empty())
+    supply.size_mm = {arguments.supply_mm[0], arguments.supply_mm[1], arguments.supply_mm[2]};
   vision::DetectionReport report;
   vision::DepthImage image;
   std::vector<double> times_ms;
   for (int k = 0; k < arguments.repeat; ++k) {
     const auto start = std::chrono::steady_clock::now();
-    const vision::DepthWindow window = vision::window_of(*points);
+    const vision::DepthWindow window = supply.size_mm.x() > 0 ? vision::window_of(supply) : vision::window_of(*points);
     vision::DepthImageBuilder builder{part->pixel_mm(), window.min_mm, window.max_mm};
     builder.add(*points);
     image = builder.image();
     const double image_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-    report = vision::detect(image, {}, *part, options);
+    report = vision::detect(image, supply, *part, options);
     report.stages_ms["depth image"] = image_ms;
     report.time_ms += image_ms;
     times_ms.push_back(report.time_ms);
@@ -165,6 +169,12 @@ void add_detect(CLI::App& app, int& exit_status) {
   command->add_option("PART.kb", arguments->part, "the knowledge base, made by binpick train")->required();
   command->add_option("SCENE.ply", arguments->scene, "the cloud: PLY, millimetres, in the supply's frame (z up)")
       ->required();
+  command
+      ->add_option("--supply-mm", arguments->supply_mm,
+                   "X Y Z: the supply's inner size, its frame in the middle of the floor; then nothing reaches through "
+                   "its walls, and what lies in it counts, as in the daemon (default: unknown)")
+      ->expected(3)
+      ->check(CLI::Range(1.0, 100'000.0));
   command->add_option("--json", arguments->json,
                       "write the whole report to this file; -: to stdout, without the table");
   command->add_option("--image", arguments->image, "write the depth image with the detections drawn over it (PNG)");

@@ -8,16 +8,19 @@ namespace binpick::vision {
 namespace {
 constexpr double kFloorGateDiameters = 0.03, kWallGateDiameters = 0.04;
 /// Floors and walls are bent and dirty.
-constexpr double kContentGateDiameters = 0.1;
+constexpr double kContentGateDiameters = 0.1, kRaisedFloorDiameters = 0.5;
 
 bool has_walls(const SupplyBox& supply) { return supply.size_mm.x() > 0 && supply.size_mm.y() > 0; }
 
-float floor_of(const Scene& scene, const SupplyBox& supply) {
-  constexpr float kUnknown = -std::numeric_limits<float>::infinity();
-  if (has_walls(supply)) return 0;
+constexpr float kUnknown = -std::numeric_limits<float>::infinity();
+
+/// Below which there is nothing and on which much lies; a part of the pixels tells it.
+float level_of(const Scene& scene) {
+  constexpr int kEvery = 3;
   std::vector<float> heights;
-  for (const float z : scene.z_mm.reshaped<Eigen::RowMajor>())
-    if (!std::isnan(z)) heights.push_back(z);
+  for (int r = 0; r < scene.rows(); r += kEvery)
+    for (int c = 0; c < scene.cols(); c += kEvery)
+      if (const float z = scene.z_mm(r, c); !std::isnan(z)) heights.push_back(z);
   if (heights.empty()) return kUnknown;
   const auto low = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 50);
   std::nth_element(heights.begin(), low, heights.end());
@@ -31,13 +34,20 @@ float floor_of(const Scene& scene, const SupplyBox& supply) {
 }  // namespace
 
 Bounds::Bounds(const Scene& scene, const SupplyBox& supply, double diameter_mm)
-    : floor_mm_{floor_of(scene, supply)},
-      content_from_mm_{floor_mm_ +
-                       static_cast<float>(std::max(3 * scene.noise_mm, kContentGateDiameters * diameter_mm))},
+    : floor_mm_{0},
+      content_from_mm_{std::numeric_limits<float>::infinity()},
       depth_mm_{static_cast<float>(std::max(3 * scene.noise_mm, kFloorGateDiameters * diameter_mm))},
       walls_mm_{Eigen::Array2f::Constant(std::numeric_limits<float>::infinity())},
       inner_mm_{Eigen::Array2d::Constant(std::numeric_limits<double>::infinity())} {
-  if (!has_walls(supply)) return;
+  const float level_mm = level_of(scene);
+  if (!has_walls(supply)) {
+    floor_mm_ = level_mm;
+    return;
+  }
+  // A false bottom or a sheet of board is no content.
+  const bool raised = level_mm > 0 && level_mm < static_cast<float>(kRaisedFloorDiameters * diameter_mm);
+  content_from_mm_ =
+      (raised ? level_mm : 0) + static_cast<float>(std::max(3 * scene.noise_mm, kContentGateDiameters * diameter_mm));
   const Eigen::Array2d half_mm = 0.5 * supply.size_mm.head<2>().array();
   walls_mm_ = (half_mm + kWallGateDiameters * diameter_mm + 2 * scene.pixel_mm).cast<float>();
   inner_mm_ = half_mm - std::max(2 * scene.pixel_mm, kContentGateDiameters * diameter_mm);

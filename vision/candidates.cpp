@@ -208,7 +208,7 @@ void Finisher::weigh_turns(Candidate& candidate, const Fan& fan, const std::func
     return Pose{R, candidate.pose.R * centroid_ + candidate.pose.t - R * centroid_};
   };
   std::vector<double> evidence(fan.angles_rad.size());
-  // Every second pixel tells it, in a quarter of the time.
+  // Of a large picture every second pixel tells it, in a quarter of the time.
   const int every = std::min(2, glance_every(scene_, part_.diameter_mm));
   const auto look = [&] {
     for (std::size_t k = 0; k < evidence.size(); ++k)
@@ -224,8 +224,8 @@ void Finisher::weigh_turns(Candidate& candidate, const Fan& fan, const std::func
     candidate.information = other.information;
     // What other poses say of it stays.
     Evidence told = other.evidence;
-    for (const Clue clue : {Clue::Claimed, Clue::Rival, Clue::Extent, Clue::Known})
-      told[clue] = candidate.evidence[clue];
+    for (std::size_t k = static_cast<std::size_t>(Clue::Claimed); k < kClueNames.size(); ++k)
+      told.clues[k] = candidate.evidence.clues[k];
     candidate.evidence = told;
     best = look();
   }

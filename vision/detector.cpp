@@ -46,9 +46,9 @@ constexpr double kScoreMin = 0.1;
 /// From this on a pose is valid by itself.
 constexpr double kValidScore = 0.5;
 
-constexpr std::array<std::string_view, 9> kAdditions{"edges",         "first look",  "turned",
-                                                     "weighed turns", "rooms",       "explain away",
-                                                     "second pass",   "all anchors", "second refinement"};
+constexpr std::array<std::string_view, 10> kAdditions{"edges", "first look",       "turned",      "weighed turns",
+                                                      "rooms", "explain away",     "second pass", "all anchors",
+                                                      "known", "second refinement"};
 
 /// The memory of the last scene, for the next one of this thread.
 Scene& spare_scene() {
@@ -376,6 +376,7 @@ class Detecting {
     options.outside = [this](const Pose& pose) { return against(pose); };
     options.rooms = with("rooms");
     options.explain_away = with("explain away");
+    options.ask_known = with("known") && !deadline_.expired();
     return options;
   }
 
@@ -392,11 +393,19 @@ class Detecting {
                      [](const Selected& a, const Selected& b) { return a.score > b.score; });
   }
 
+  /// Why the score is small where nothing speaks against the pose itself.
+  static std::string too_little(const Evidence& evidence) {
+    if (evidence[Clue::Known] >= kKnownEnough || score_by_itself(evidence) < kScoreMin) return "too little evidence";
+    const long percent = std::lround(100 * evidence[Clue::Known]);
+    return "most of the supply is something else (" + std::to_string(percent) + " % known)";
+  }
+
   void report(const std::vector<Selected>& selected) {
     const auto rejections = static_cast<std::size_t>(std::max(0, options_.rejections_max));
     for (const Selected& entry : selected) {
       const Transform<frame::Supply, frame::Object> T{entry.candidate.pose.iso()};
-      const std::string reason = entry.reason.empty() && entry.score < kScoreMin ? "too little evidence" : entry.reason;
+      const std::string reason =
+          entry.reason.empty() && entry.score < kScoreMin ? too_little(entry.candidate.evidence) : entry.reason;
       if (reason.empty()) {
         Detection detection;
         detection.T_supply_object = T;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <utility>
 
 #include "vision/team.hpp"
 
@@ -15,6 +16,7 @@ constexpr double kPlateauDiameters = 0.02;
 constexpr double kGridDiameters = 0.09;
 /// Steeper than this between two pixels is another surface.
 constexpr float kSlopeMax = 1.0F;
+/// By so many sd of a single point may neighbouring pixels differ.
 constexpr double kSpikeSds = 1.5;
 
 struct Peak {
@@ -34,7 +36,7 @@ float without_spike(const Grid<float>& z_mm, int row, int col) {
       for (float& known : highest)
         if (z > known) std::swap(z, known);
     }
-  return std::min(z_mm(row, col), highest.back());
+  return std::isinf(highest.back()) ? z_mm(row, col) : std::min(z_mm(row, col), highest.back());
 }
 
 bool is_local_maximum(const Scene& scene, const Grid<float>& z_mm, int row, int col, int radius) {
@@ -94,7 +96,7 @@ std::vector<Eigen::Vector3f> find_maxima(const Scene& scene, const MaximaOptions
   const int radius =
       std::max(2, static_cast<int>(std::lround(kWindowDiameters * options.diameter_mm / scene.pixel_mm)));
   Grid<float> z_mm = scene.z_mm;
-  // Only where noise from pixel to pixel is as steep as surfaces are: a fine scanner's narrow tops are real.
+  // Where noise may be steeper than a surface; elsewhere narrow tops are real.
   const bool spiky = kSpikeSds * scene.noise_mm > static_cast<double>(kSlopeMax) * scene.pixel_mm;
   const std::size_t rows_to_mend = spiky ? static_cast<std::size_t>(scene.rows()) : 0;
   share(options.threads, rows_to_mend, Deadline{}, [&](std::size_t row, int) {

@@ -75,9 +75,7 @@ std::array<double, kSecondTerms> second_terms(double by_itself, double known) {
     const double q = std::clamp(p, least, 1 - least);
     return std::log(q / (1 - q));
   };
-  // Of a supply that is the part's, more than this share is known, however deep others lie.
-  constexpr double kKnownEnough = 0.4;
-  return {1, logit(by_itself, 1e-6), std::min(logit(known, 0.1), logit(kKnownEnough, 0.1))};
+  return {1, logit(by_itself, 1e-6), std::min(logit(known, 0.1), logit(static_cast<double>(kKnownEnough), 0.1))};
 }
 
 double score_of(const Evidence& evidence) {

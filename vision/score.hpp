@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 
@@ -26,6 +25,9 @@ double score_by_itself(const Evidence& evidence);
 /// What is linear in the second step, since a supply that is mostly something else rarely holds the part: 1, and the
 /// logits of score_by_itself() and of what is known of the supply.
 inline constexpr std::size_t kSecondTerms = 3;
+/// Of a supply that is the part's, more than this share is known, however deep others lie (some hundred of them: more
+/// than a few hundred visible ones are not all looked at).
+inline constexpr float kKnownEnough = 0.4F;
 std::array<double, kSecondTerms> second_terms(double by_itself, double known);
 
 /// Probability that the pose is right: logistic in second_terms(), times against_rival(). The weights come from

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "base/check.hpp"
 #include "vision/team.hpp"
 
 namespace binpick::vision {
@@ -75,13 +76,13 @@ class Selecting {
         options_{options},
         candidates_{std::move(candidates)},
         owner_{Grid<std::int32_t>::Constant(scene.rows(), scene.cols(), -1)},
-        content_{std::max(1.0F, options.content.cast<float>().sum())} {
+        content_px_{std::max(1.0, options.content.cast<double>().sum())} {
+    BINPICK_CHECK(options.content.rows() == scene.rows() && options.content.cols() == scene.cols());
     std::stable_sort(candidates_.begin(), candidates_.end(),
                      [](const Candidate& a, const Candidate& b) { return a.test.evidence > b.test.evidence; });
     for (const Candidate& c : candidates_) {
       centres_.push_back(c.pose.R * options.centroid_mm + c.pose.t);
       std::string reason = options.outside ? options.outside(c.pose) : "";
-      outside_.push_back(!reason.empty());
       if (reason.empty() && score_by_itself(c.evidence) < options.score_min) reason = what_speaks_against(c.test);
       own_reasons_.push_back(std::move(reason));
     }
@@ -142,7 +143,7 @@ class Selecting {
   void judge(std::size_t i) {
     if (std::any_of(standing_.begin(), standing_.end(), [&](const Standing& s) { return same(s.candidate, i); }))
       return;
-    Selected entry{.candidate = candidates_[i], .reason = own_reasons_[i], .outside = outside_[i]};
+    Selected entry{.candidate = candidates_[i], .reason = own_reasons_[i]};
     if (entry.reason.empty()) {
       if (const auto there = std::find_if(standing_.begin(), standing_.end(),
                                           [&](const Standing& s) { return in_one_place(s.candidate, i); });
@@ -159,28 +160,33 @@ class Selecting {
         entry.reason = what_speaks_against(entry.candidate.test);
     }
     if (entry.reason.empty()) {
-      std::size_t explained = 0;
+      int explained = 0, aside = 0;
       for_explained(shown_[i], [&](std::int32_t pixel) {
         std::int32_t& owner = owner_.data()[pixel];
         if (owner >= 0) return;
         owner = static_cast<std::int32_t>(standing_.size());
         ++explained;
-        content_ += static_cast<float>(1 - options_.content.data()[pixel]);
+        aside += options_.content.data()[pixel] == 0;
       });
-      entry.candidate.evidence[Clue::Extent] = static_cast<float>(explained);
+      Evidence& evidence = entry.candidate.evidence;
+      evidence[Clue::Extent] = static_cast<float>(explained);
+      // What lies low is content as far as it is believed to be the part.
+      content_px_ += score_by_itself(evidence) * aside;
       standing_.push_back({i, all_.size()});
     }
     all_.push_back(std::move(entry));
   }
 
   void tell_known() {
-    double known = 0;
+    double known_px = 0;
+    for (const Selected& entry : all_)
+      if (const Evidence& e = entry.candidate.evidence; e[Clue::Extent] > 0)
+        known_px += score_by_itself(e) * static_cast<double>(e[Clue::Extent]);
     for (Selected& entry : all_) {
-      float& extent = entry.candidate.evidence[Clue::Extent];
-      extent /= content_;
-      if (extent > 0) known += score_by_itself(entry.candidate.evidence) * static_cast<double>(extent);
+      Evidence& e = entry.candidate.evidence;
+      e[Clue::Extent] = static_cast<float>(static_cast<double>(e[Clue::Extent]) / content_px_);
+      if (options_.ask_known) e[Clue::Known] = static_cast<float>(known_px / content_px_);
     }
-    for (Selected& entry : all_) entry.candidate.evidence[Clue::Known] = static_cast<float>(known);
   }
 
   void add_rival(const Standing& standing, const Selected& entry) {
@@ -220,12 +226,11 @@ class Selecting {
   std::vector<Candidate> candidates_;  // strongest first
   std::vector<Eigen::Vector3f> centres_;
   std::vector<std::string> own_reasons_;
-  std::vector<bool> outside_;
   std::vector<Shown> shown_;
   std::vector<Standing> standing_;
   std::vector<Selected> all_;
   Grid<std::int32_t> owner_;  // of each pixel: who of those standing explains it first
-  float content_;             // pixels: of the contents, and what those standing explain besides
+  double content_px_;         // what lies in the supply, and what those standing explain besides
 };
 }  // namespace
 

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
 
 #include "vision/refinement.hpp"
+#include "vision/scene.hpp"
 #include "vision/score.hpp"
 #include "vision/symmetry.hpp"
 
@@ -26,10 +28,11 @@ struct SelectOptions {
   Eigen::Vector3f centroid_mm = Eigen::Vector3f::Zero();  ///< Object frame.
   int threads = 2;
   double score_min = 0.1;
-  Grid<std::uint8_t> content;  ///< Of each pixel of the scene, whether it is 1: something lies there. Or 0.
+  Grid<std::uint8_t> content;  ///< As large as the scene: 1 where something lies (Bounds::content()), else 0.
   std::function<std::string(const Pose&)> outside;  ///< Why the part cannot be there at all; empty: it can.
   bool rooms = true;                                ///< Two bodies do not share room.
   bool explain_away = true;                         ///< A pixel is explained once.
+  bool ask_known = true;  ///< What is known of the supply counts: not where only a part of it was looked at.
 };
 
 struct Selected {
@@ -37,7 +40,6 @@ struct Selected {
   double score = 0;           ///< Probability of being right.
   std::string reason;         ///< Why it is not believed; empty: it is.
   bool overshadowed = false;  ///< The reason is a better one at the same place.
-  bool outside = false;       ///< The part cannot be there at all.
 };
 
 /// Goes through the candidates by evidence: the first stands; what shows the same object again is dropped, what lives

@@ -54,7 +54,7 @@ AlarmScene alarm_scene(const ClassSetting& setting, const std::string& split, st
                     : foreign_part(setting, round % 2 != 0);
   scene.id = {first_pile + k % kPiles, fills[k / kPiles % fills.size()], first_pile * 1'000 + number};
   if (split == kTune && scene.kind == 2) {
-    // Each part sees all piles of either body.
+    // In 4 × 24 rounds or more each part sees all piles of either body, at all fills.
     const std::size_t pair = round / 2;
     scene.id.pile = first_pile + pair % kTuneForeignPiles;
     scene.id.fill = fills[(pair + pair / kTuneForeignPiles) % fills.size()];

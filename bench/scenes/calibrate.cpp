@@ -1,6 +1,7 @@
 #include "bench/scenes/calibrate.hpp"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -107,9 +108,11 @@ Fit fitted(const std::vector<Example>& examples, double rival_scale) {
     fit.weights += delta;
     if (delta.norm() < 1e-6) break;
   }
+  const auto counted =
+      static_cast<double>(std::ranges::count_if(examples, [](const Example& e) { return e.weight > 0; }));
   for (const Example& e : examples) {
     const double p = probability(fit, e);
-    fit.loss -= e.weight * std::log(std::max(1e-12, e.right ? p : 1 - p)) / static_cast<double>(examples.size());
+    fit.loss -= e.weight * std::log(std::max(1e-12, e.right ? p : 1 - p)) / counted;
   }
   return fit;
 }
@@ -157,7 +160,7 @@ void calibrate(const std::vector<std::string>& folders) {
     right += e.right;
   }
   std::printf("// %zu poses of %zu scenes, %.0f of them right; log loss %.4f and %.4f, calibration error %.4f.\n",
-              examples.size(), scenes, right, best.loss, last.loss, calibration_error(believed));
+              believed.size(), scenes, right, best.loss, last.loss, calibration_error(believed));
   std::printf("constexpr double kRivalScale = %g;\n", best.rival_scale);
   print("kWeights", "kTerms", best.weights);
   print("kSecondWeights", "kSecondTerms", last.weights);

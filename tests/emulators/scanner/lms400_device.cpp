@@ -14,8 +14,8 @@ using drivers::lms400::Text;
 // sFA codes, as newer devices of the maker use them.
 constexpr std::uint32_t kAccessDenied = 0x1, kUnknownMethod = 0x2, kUnknownVariable = 0x3, kInvalidArgument = 0x5,
                         kTooFewArguments = 0x8, kWriteDenied = 0xA, kUnknownCommand = 0xC, kBusy = 0xD;
-/// A host that cannot keep up loses lines. A device is never late with those that it sends: on a busy machine that would
-/// turn the picture by what the pivot moves meanwhile.
+/// A host that cannot keep up loses lines. Those that are sent are hardly late, as a device's: on a busy machine that
+/// would turn the picture by what the pivot moves meanwhile.
 constexpr Duration kLagMax = std::chrono::milliseconds(4);
 
 double rounded(double value, double step) { return step > 0 ? std::round(value / step) * step : value; }

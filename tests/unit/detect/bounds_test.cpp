@@ -55,10 +55,21 @@ TEST(Bounds, ContentIsWhatLiesInTheSupplyHigherThanDirt) {
   EXPECT_EQ((Bounds{scene, kSupply, kDiameterMm}.content(scene).cast<int>().sum()), 0);
   scene.z_mm.block(40, 50, 10, 20).setConstant(30);
   scene.z_mm.block(40, 50, 10, 5).setConstant(std::numeric_limits<float>::quiet_NaN());
-  scene.z_mm.leftCols(4).setConstant(80);  // a wall
+  scene.z_mm.middleCols(5, 4).setConstant(80);  // a wall that leans inwards
   const Grid<std::uint8_t> content = Bounds{scene, kSupply, kDiameterMm}.content(scene);
   EXPECT_EQ(content.cast<int>().sum(), 150);
   EXPECT_EQ(content(45, 60), 1);
+  EXPECT_EQ((Bounds{scene, {}, kDiameterMm}.content(scene).cast<int>().sum()), 0) << "whose is it?";
+}
+
+TEST(Bounds, AFalseBottomIsNoContent) {
+  Scene scene = level(30);
+  scene.z_mm.block(40, 50, 10, 20).setConstant(60);
+  const Bounds bounds{scene, kSupply, kDiameterMm};
+  EXPECT_EQ(bounds.floor_mm(), 0) << "a part may still lie beside the sheet";
+  EXPECT_EQ(bounds.content(scene).cast<int>().sum(), 200);
+  scene.z_mm.array() += 30;  // higher than half a diameter: a layer
+  EXPECT_GT((Bounds{scene, kSupply, kDiameterMm}.content(scene).cast<int>().sum()), 5000);
 }
 }  // namespace
 }  // namespace binpick::vision

@@ -34,8 +34,8 @@ TEST(Maxima, OfAPlateauAreAGridOnIt) {
 
 TEST(Maxima, NoiseOnTopDoesNotHideThePlateau) {
   Scene scene = block(3);
-  scene.z_mm(14, 19) = scene.z_mm(14, 20) = 66;
-  scene.z_mm(17, 21) = 64;
+  // Each pixel of the block lies beside one of these.
+  scene.z_mm(12, 19) = scene.z_mm(12, 20) = scene.z_mm(17, 19) = scene.z_mm(17, 20) = 66;
   const auto maxima = maxima_of(scene);
   ASSERT_FALSE(maxima.empty());
   for (const Eigen::Vector3f& m : maxima) EXPECT_FLOAT_EQ(m.z(), 55);
