@@ -34,6 +34,7 @@ std::size_t filled(std::size_t count) { return (count + kernels::kLanes - 1) / k
 /// Calls use(row, col) for every so-manieth of the set bits, so that about `most` are used; a byte for eight pixels.
 template <class Use>
 void thinned(const std::vector<std::uint8_t>& bits, std::size_t row_bytes, std::size_t most, const Use& use) {
+  if (most == 0) return;
   const int count = std::transform_reduce(bits.begin(), bits.end(), 0, std::plus{},
                                           [](std::uint8_t byte) { return std::popcount(byte); });
   const int step = std::max(1, (count + static_cast<int>(most) - 1) / static_cast<int>(most));

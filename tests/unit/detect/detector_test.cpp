@@ -247,6 +247,17 @@ TEST(Detector, AnObserverSeesTheTruePoseThroughEveryStage) {
   EXPECT_EQ(report.detections.size(), detect_in(image).detections.size());
 }
 
+TEST(Detector, AnyAdditionMayBeLeftOut) {
+  const Eigen::Isometry3d truth = pose(40, -30, 0, 0.3);
+  const DepthImage image = scenes::image_of(bracket_base().mesh(), {truth}, 6);
+  for (const std::string_view addition : detector_additions()) {
+    DetectorOptions options = scenes::options();
+    options.without = {std::string{addition}};
+    const DetectionReport report = detect(image, kSupply, bracket_base(), options);
+    EXPECT_LT(error_of(report, truth).mm, 3) << "without " << addition;
+  }
+}
+
 TEST(Detector, ADeadlineInThePastStillReturns) {
   DetectorOptions options = scenes::options();
   options.deadline = std::chrono::milliseconds{0};
