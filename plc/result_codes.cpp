@@ -12,7 +12,7 @@ constexpr std::array kResults{
                "Exchange the supply."},
     ResultText{ResultCode::NothingFound, "nothing found",
                "Something lies in the supply, but no object of this part was recognised.",
-               "Check that the right part is in the supply; stir or tilt it, then request again."},
+               "Check that the right part is in the supply, and little else; stir or tilt it, then request again."},
     ResultText{
         ResultCode::NotReachable, "found but not reachable",
         "Objects were found, but each grasp is too steep or leaves the supply's walls.",
