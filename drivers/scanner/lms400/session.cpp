@@ -7,7 +7,7 @@
 
 #include "base/log.hpp"
 #include "drivers/scanner/lms400/codec.hpp"
-#include "drivers/scanner/lms400/scan_clock.hpp"
+#include "drivers/scanner/scan_clock.hpp"
 
 namespace binpick::drivers::lms400 {
 namespace {
@@ -61,7 +61,7 @@ struct Session::Impl {
   bool expects_profiles = false, restart_after_stop = false;
 
   Ready configured{};
-  ScanClock clock;
+  scanner::ScanClock clock;
   std::uint64_t lost = 0, skipped = 0, skipped_reported = 0;
   bool garbage_since_answer = false;
 

@@ -5,7 +5,7 @@
 
 #include "base/clock.hpp"
 
-namespace binpick::drivers::lms400 {
+namespace binpick::drivers::scanner {
 /// When each scan was measured, from when its telegram arrived and from the scan counter. The device gives no time.
 ///
 /// Scan k was measured at t0 + k·T. Telegrams come late by anything from nothing to tens of milliseconds (bursts: many
@@ -40,4 +40,4 @@ class ScanClock {
   std::uint16_t counter_ = 0;
   std::deque<Arrival> arrivals_;
 };
-}  // namespace binpick::drivers::lms400
+}  // namespace binpick::drivers::scanner

@@ -1,10 +1,10 @@
-#include "drivers/scanner/lms400/scan_clock.hpp"
+#include "drivers/scanner/scan_clock.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
-namespace binpick::drivers::lms400 {
+namespace binpick::drivers::scanner {
 namespace {
 constexpr double kWindow_s = 1.5;
 constexpr std::size_t kArrivalsMax = 1024;
@@ -84,4 +84,4 @@ ScanClock::Reading ScanClock::on_scan(std::uint16_t counter, TimePoint received_
   reading.measured_at = std::min(received_at, origin_ + from_s(nominal_s + line_at(scan_)));
   return reading;
 }
-}  // namespace binpick::drivers::lms400
+}  // namespace binpick::drivers::scanner

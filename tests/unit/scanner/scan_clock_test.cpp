@@ -1,4 +1,4 @@
-#include "drivers/scanner/lms400/scan_clock.hpp"
+#include "drivers/scanner/scan_clock.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-namespace binpick::drivers::lms400 {
+namespace binpick::drivers::scanner {
 namespace {
 using namespace std::chrono_literals;
 constexpr TimePoint kStart = TimePoint{} + 1000s;
@@ -107,4 +107,4 @@ TEST(ScanClock, StandingCounterIsTakenAsOneScanEach) {
   }
 }
 }  // namespace
-}  // namespace binpick::drivers::lms400
+}  // namespace binpick::drivers::scanner
