@@ -270,12 +270,14 @@ constexpr std::string_view kMakers = R"(## Siemens S7-1200/1500
 | read | 0 | 40009 | 74 | status and result, Array[0..73] of Word |
 
 Put the arrays into data blocks with standard access (`{ S7_Optimized_Access := 'FALSE' }`): the f32 at word n is the Real at byte
-2 · (n − 8) of the array that was read. Do not change inputs while BUSY is 1.
+2 · (n − 8) of the array that was read. Do not change inputs while BUSY is 1. `binpick export plc --for s7` writes all of this and the
+handshake as an SCL source: [plc/tia-portal.md](plc/tia-portal.md).
 
 ## Rockwell Logix
 
 `plc.word_order = "logix"`. One transaction writes 8 words at address 0, one reads 74 words at address 8 into an INT array; COP from it
 into a structure of INT, DINT and REAL: each 32-bit value of a block starts at an even word, so that the structure has no holes.
+`binpick export plc --for logix` writes the structures, tags and the handshake: [plc/studio-5000.md](plc/studio-5000.md).
 )";
 }  // namespace
 
