@@ -13,4 +13,5 @@ void add_probe(CLI::App& app, int& exit_status);
 void add_scan(CLI::App& app, int& exit_status);
 void add_train(CLI::App& app, int& exit_status);
 void add_detect(CLI::App& app, int& exit_status);
+void add_export(CLI::App& app, int& exit_status);
 }  // namespace binpick::tools

@@ -23,7 +23,9 @@ std::string spoken_to(const CLI::App& app) {
 
 int main(int argc, char** argv) {
   using namespace binpick;
-  CLI::App app{"The command beside binpickd: check a cell, reach its devices, train parts, detect them.", "binpick"};
+  CLI::App app{
+      "The command beside binpickd: check a cell, reach its devices, train parts, detect them, program its PLC.",
+      "binpick"};
   app.require_subcommand(1);
   app.set_version_flag("--version", "binpick " BINPICK_VERSION);
   int exit_status = 0;
@@ -32,6 +34,7 @@ int main(int argc, char** argv) {
   tools::add_scan(app, exit_status);
   tools::add_train(app, exit_status);
   tools::add_detect(app, exit_status);
+  tools::add_export(app, exit_status);
   // CLI11 would only say that a subcommand is missing.
   if (argc > 1 && argv[1][0] != '-') {
     std::string names;
