@@ -1,12 +1,13 @@
 #include "drivers/robot/codec.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <vector>
 
 #include "base/check.hpp"
-#include "base/rotation.hpp"
+#include "drivers/robot/dialect.hpp"
 
 namespace binpick::drivers::robot {
 namespace {
@@ -29,18 +30,54 @@ std::optional<std::uint16_t> read_id(std::string_view word) {
   return id;
 }
 
-void append_pose(std::string& out, const Transform<frame::Base, frame::Tcp>& T_base_tcp) {
-  const Eigen::Vector3d position = T_base_tcp.iso.translation();
-  const Eigen::Vector3d turn = to_rotation_vector(T_base_tcp.iso.linear());
+void append_integer(std::string& out, const Format& format, unsigned value) {
+  char text[16];
+  std::snprintf(text, sizeof text, "%0*u", format.integer_width, value);
+  out += text;
+}
+
+void append_real(std::string& out, const Format& format, double value, int decimals) {
+  if (std::abs(value) < 0.5 * std::pow(10.0, -decimals)) value = 0.0;  // no "-0.000"
+  char text[32];
+  std::snprintf(text, sizeof text, "%0*.*f", format.real_width, decimals, value);
+  out += text;
+}
+
+void append_pose(std::string& out, const Format& format, const Transform<frame::Base, frame::Tcp>& T_base_tcp) {
+  const Eigen::Vector3d position_mm = T_base_tcp.iso.translation();
+  const Eigen::Vector3d angles = format.to_angles(T_base_tcp.iso.linear());
   // A robot must never see "nan" or a kilometre; poses come from our own detector and transforms.
-  BINPICK_CHECK(position.allFinite() && position.cwiseAbs().maxCoeff() < 1e6 && turn.allFinite());
-  const auto add = [&out](double v, int decimals) {
-    char text[32];
-    std::snprintf(text, sizeof text, ",%.*f", decimals, v);
-    out += text;
-  };
-  for (int i = 0; i < 3; ++i) add(position[i] * 1e-3, 6);
-  for (int i = 0; i < 3; ++i) add(turn[i], 7);
+  BINPICK_CHECK(position_mm.allFinite() && position_mm.cwiseAbs().maxCoeff() < kLengthMax_mm && angles.allFinite());
+  for (int i = 0; i < 6; ++i) {
+    if (i > 0) out += ',';
+    if (i < 3)
+      append_real(out, format, position_mm[i] / format.mm_per_unit, format.length_decimals);
+    else
+      append_real(out, format, angles[i - 3], format.angle_decimals);
+  }
+}
+
+/// What stands behind field i (from 0) of an answer.
+std::string_view separator(const Format& format, std::size_t i) {
+  if (i + 1 == kReplyFields) return format.close;
+  return i == 5 || i == 11 ? format.pose_break : std::string_view{","};
+}
+
+constexpr bool is_integer(std::size_t i) { return i < 6 || i >= 18; }
+
+/// A whole number of 0 … 65535, or a decimal fraction; nullopt for anything else.
+std::optional<double> read_number(std::string_view word, const Format& format, std::size_t i) {
+  const auto width = static_cast<std::size_t>(is_integer(i) ? format.integer_width : format.real_width);
+  if (width != 0 && word.size() != width) return std::nullopt;
+  double value = 0;
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value, std::chars_format::fixed);
+  if (error != std::errc{} || end != word.data() + word.size() || !std::isfinite(value)) return std::nullopt;
+  if (is_integer(i)) {
+    if (value < 0 || value > 65535 || value != std::floor(value)) return std::nullopt;
+  } else if (i % 6 < 3 ? std::abs(value * format.mm_per_unit) >= kLengthMax_mm : std::abs(value) > format.angle_max) {
+    return std::nullopt;
+  }
+  return value;
 }
 }  // namespace
 
@@ -75,18 +112,23 @@ Expected<Request, BadLine> decode_request(std::string_view line) {
   return Request{words[0] == "done" ? Request::Kind::Done : Request::Kind::Failed, *id};
 }
 
-std::string encode(const Request& request) {
+std::string encode(const Request& request, Dialect dialect) {
+  std::string line;
   switch (request.kind) {
     case Request::Kind::Hello:
-      return "hello\n";
+      line = "hello";
+      break;
     case Request::Kind::Fetch:
-      return "fetch\n";
+      line = "fetch";
+      break;
     case Request::Kind::Done:
-      return "done " + std::to_string(request.pick_id) + "\n";
+      line = "done " + std::to_string(request.pick_id);
+      break;
     case Request::Kind::Failed:
-      return "failed " + std::to_string(request.pick_id) + "\n";
+      line = "failed " + std::to_string(request.pick_id);
+      break;
   }
-  return "\n";
+  return line.append(format_of(dialect).request_end);
 }
 
 void LineReader::push(ByteView bytes) {
@@ -98,19 +140,16 @@ void LineReader::push(ByteView bytes) {
 std::optional<Expected<std::string, BadLine>> LineReader::next() {
   while (at_ < pending_.size()) {
     const char c = static_cast<char>(pending_[at_++]);
-    if (c != '\n') {
-      // One more than the longest line is kept: a CR that belongs to the line end.
-      if (line_.size() <= kLineBytesMax)
+    if (c != '\n' && c != '\r') {
+      if (line_.size() < kLineBytesMax)
         line_.push_back(c);
       else
         too_long_ = true;
       continue;
     }
     std::string line = std::exchange(line_, {});
-    bool too_long = std::exchange(too_long_, false);
-    if (!too_long && !line.empty() && line.back() == '\r') line.pop_back();
-    too_long = too_long || line.size() > kLineBytesMax;
-    if (too_long) return Expected<std::string, BadLine>{tl::unexpect, BadLine{BadLine::Kind::TooLong}};
+    if (std::exchange(too_long_, false))
+      return Expected<std::string, BadLine>{tl::unexpect, BadLine{BadLine::Kind::TooLong}};
     if (!line.empty()) return Expected<std::string, BadLine>{std::move(line)};
   }
   return std::nullopt;
@@ -118,50 +157,66 @@ std::optional<Expected<std::string, BadLine>> LineReader::next() {
 
 void LineReader::clear() { *this = {}; }
 
-std::string encode(const Reply& reply) {
-  const auto number = [](auto value) { return std::to_string(static_cast<unsigned>(value)); };
-  std::string out = "(" + number(kProtocolVersion) + "," + number(reply.status) + "," + number(reply.pick.pick_id) +
-                    "," + number(reply.pick.sequence) + "," + number(reply.pick.part_id) + "," +
-                    number(reply.pick.objects_left);
-  append_pose(out, reply.pick.T_base_approach);
-  append_pose(out, reply.pick.T_base_grasp);
-  return out + "," + number(reply.reported_id) + "," + number(reply.outcome) + ")\n";
+std::string encode(const Reply& reply, Dialect dialect) {
+  const Format& format = format_of(dialect);
+  const Pick& pick = reply.pick;
+  std::string out{format.open};
+  const auto add = [&](std::string_view before, unsigned value) {
+    out += before;
+    append_integer(out, format, value);
+  };
+  add("", static_cast<unsigned>(kProtocolVersion));
+  for (const unsigned value : {static_cast<unsigned>(reply.status), unsigned{pick.pick_id}, unsigned{pick.sequence},
+                               unsigned{pick.part_id}, unsigned{pick.objects_left}})
+    add(",", value);
+  for (const auto* T_base_tcp : {&pick.T_base_approach, &pick.T_base_grasp}) {
+    out += format.pose_break;
+    append_pose(out, format, *T_base_tcp);
+  }
+  add(",", reply.reported_id);
+  add(",", static_cast<unsigned>(reply.outcome));
+  return out.append(format.close).append(format.end);
 }
 
-Expected<std::optional<DecodedReply>, BadReply> decode_reply(std::string_view text) {
-  const auto bad = [](const std::string& why) { return unexpected(BadReply{why}); };
-  const std::size_t start = text.find_first_not_of("\r\n ");
-  if (start == std::string_view::npos) return std::optional<DecodedReply>{};
-  if (text[start] != '(') return bad("no parenthesis at the start of an answer");
-  const std::size_t end = text.find(')', start);
-  if (end == std::string_view::npos) {
-    if (text.size() - start > kReplyBytesMax) return bad("no closing parenthesis");
-    return std::optional<DecodedReply>{};
-  }
+Expected<std::optional<DecodedReply>, BadReply> decode_reply(std::string_view text, Dialect dialect) {
+  using Result = Expected<std::optional<DecodedReply>, BadReply>;
+  const Format& format = format_of(dialect);
+  const auto bad = [](const std::string& why) { return Result{tl::unexpect, BadReply{why}}; };
+  std::size_t at = std::min(text.find_first_not_of("\r\n "), text.size());
+  const auto incomplete = [&, start = at] {
+    if (text.size() - start > kReplyBytesMax) return bad("an answer without an end");
+    return Result{std::optional<DecodedReply>{}};
+  };
+  // One piece of punctuation: true when it stands at `at`, false when something else does; nullopt when it may still
+  // come.
+  const auto take = [&](std::string_view mark) -> std::optional<bool> {
+    const std::string_view there = text.substr(at, mark.size());
+    if (there != mark.substr(0, there.size())) return false;
+    if (there.size() < mark.size()) return std::nullopt;
+    at += mark.size();
+    return true;
+  };
+  const auto opened = take(format.open);
+  if (!opened) return incomplete();
+  if (!*opened) return bad("no parenthesis at the start of an answer");
   std::array<double, kReplyFields> fields{};
-  std::size_t count = 0;
-  const char* at = text.data() + start + 1;
-  const char* const stop = text.data() + end;
-  while (true) {
-    if (count == kReplyFields) return bad("more than " + std::to_string(kReplyFields) + " numbers");
-    const auto [next, error] = std::from_chars(at, stop, fields[count], std::chars_format::fixed);
-    if (error != std::errc{} || !std::isfinite(fields[count]))
-      return bad("no number in field " + std::to_string(count + 1));
-    ++count;
-    at = next;
-    if (at == stop) break;
-    if (*at++ != ',') return bad("no comma behind field " + std::to_string(count));
+  for (std::size_t i = 0; i < kReplyFields; ++i) {
+    const std::size_t end = text.find_first_of(",)\r\n", at);
+    if (end == std::string_view::npos) return incomplete();
+    const auto number = read_number(text.substr(at, end - at), format, i);
+    if (!number) return bad("field " + std::to_string(i + 1) + " is no number of its kind and range");
+    fields[i] = *number;
+    at = end;
+    const auto separated = take(separator(format, i));
+    if (!separated) return incomplete();
+    if (!*separated) return bad("not the " + std::to_string(kReplyFields) + " numbers of this dialect");
   }
-  if (count != kReplyFields) return bad(std::to_string(count) + " numbers instead of " + std::to_string(kReplyFields));
-  for (const std::size_t i : {0U, 1U, 2U, 3U, 4U, 5U, 18U, 19U})
-    if (fields[i] < 0 || fields[i] > 65535 || fields[i] != std::floor(fields[i]))
-      return bad("field " + std::to_string(i + 1) + " is no number of 0 ... 65535");
   if (fields[0] != kProtocolVersion) return bad("protocol version is not " + std::to_string(kProtocolVersion));
   const auto word = [&](std::size_t i) { return static_cast<std::uint16_t>(fields[i]); };
   const auto pose = [&](std::size_t i) {
     Transform<frame::Base, frame::Tcp> T_base_tcp;
-    T_base_tcp.iso.translation() = 1e3 * Eigen::Vector3d{fields[i], fields[i + 1], fields[i + 2]};
-    T_base_tcp.iso.linear() = from_rotation_vector({fields[i + 3], fields[i + 4], fields[i + 5]});
+    T_base_tcp.iso.translation() = format.mm_per_unit * Eigen::Vector3d{fields[i], fields[i + 1], fields[i + 2]};
+    T_base_tcp.iso.linear() = format.from_angles({fields[i + 3], fields[i + 4], fields[i + 5]});
     return T_base_tcp;
   };
   DecodedReply decoded;
@@ -169,7 +224,7 @@ Expected<std::optional<DecodedReply>, BadReply> decode_reply(std::string_view te
                    {word(2), word(3), word(4), word(5), pose(6), pose(12)},
                    word(18),
                    static_cast<Outcome>(word(19))};
-  decoded.consumed = end + 1;
+  decoded.consumed = at;
   return std::optional{decoded};
 }
 }  // namespace binpick::drivers::robot

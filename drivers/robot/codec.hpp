@@ -11,16 +11,18 @@
 #include "base/expected.hpp"
 #include "drivers/robot/session.hpp"
 
-/// The robot's line protocol, dialect of Universal Robots. Pure functions: no socket, no clock, no log.
-/// The robot sends one line, the cell answers with one parenthesised group of numbers, as socket_read_ascii_float() of
-/// URScript reads it (Universal Robots script manual, "socket_read_ascii_float": at most 30 numbers, comma-separated).
-/// Every answer has the same number of fields, because before PolyScope 5.15 a list variable cannot change its length.
-/// The protocol is described for integrators in docs/robots/universal-robots.md.
+/// The robot's line protocol. Pure functions: no socket, no clock, no log.
+/// The robot sends one line, the cell answers with twenty numbers, the same number of fields every time: before
+/// PolyScope 5.15 a list variable of URScript cannot change its length, and a program of any make is simpler so. How
+/// numbers, poses and lines are written is the dialect's (dialect.hpp). The protocol is described for integrators in
+/// docs/robots/, one page for each make.
 namespace binpick::drivers::robot {
 inline constexpr int kProtocolVersion = 1;
 /// Longest request without its line end. Strings of other makers' controllers hold 127 or 254 characters.
 inline constexpr std::size_t kLineBytesMax = 126;
 inline constexpr std::size_t kReplyFields = 20;
+/// No coordinate of a pose is as large; supplies, poses and meshes of a cell file cannot add up to it.
+inline constexpr double kLengthMax_mm = 99'999;
 /// No answer is longer than this, line end included; a longer group is not ours.
 inline constexpr std::size_t kReplyBytesMax = 512;
 
@@ -43,10 +45,10 @@ std::string to_string(const BadLine& error);
 
 /// One line without its line end.
 Expected<Request, BadLine> decode_request(std::string_view line);
-/// With its line end.
-std::string encode(const Request& request);
+/// With the line end of the make.
+std::string encode(const Request& request, Dialect dialect);
 
-/// Cuts a stream into lines: ended by LF or CR LF, without it; empty lines are skipped. A line of more than
+/// Cuts a stream into lines: ended by CR, LF or CR LF, without it; empty lines are skipped. A line of more than
 /// kLineBytesMax bytes is given once, as TooLong, when its end has come. Looks at each byte once.
 class LineReader {
  public:
@@ -78,7 +80,7 @@ enum class Status : std::uint16_t {
 enum class Outcome : std::uint16_t { None = 0, Done = 1, Failed = 2 };
 
 /// One answer. Fields in order: protocol version, status, pick id, sequence, part, objects left, approach pose (6),
-/// grasp pose (6), pick id of the last report on record, its outcome. Poses are tcp in base: metres, rotation vector.
+/// grasp pose (6), pick id of the last report on record, its outcome. Poses are tcp in base.
 struct Reply {
   Status status = Status::NotReady;
   Pick pick;  ///< Default (all zero, identity) where there is none.
@@ -86,8 +88,8 @@ struct Reply {
   Outcome outcome = Outcome::None;
 };
 
-/// Plain decimals, at least six of them behind the point of lengths and angles, one line.
-std::string encode(const Reply& reply);
+/// Plain decimals, never an exponent; at most 255 bytes, no line of more than kLineBytesMax where lines are read whole.
+std::string encode(const Reply& reply, Dialect dialect);
 
 struct BadReply {
   std::string text;
@@ -96,6 +98,6 @@ struct DecodedReply {
   Reply reply;
   std::size_t consumed = 0;
 };
-/// First group of `text`; nullopt while it is incomplete. The robot's half, for emulators and tests.
-Expected<std::optional<DecodedReply>, BadReply> decode_reply(std::string_view text);
+/// First answer in `text`; nullopt while it is incomplete. The robot's half, for emulators and tests.
+Expected<std::optional<DecodedReply>, BadReply> decode_reply(std::string_view text, Dialect dialect);
 }  // namespace binpick::drivers::robot

@@ -82,7 +82,7 @@ struct Session::Impl {
                     to_string(request.error()).c_str());
       bad_line_logged = true;
     }
-    append(output, as_bytes(encode(request ? answer(*request) : reply(Status::BadRequest))));
+    append(output, as_bytes(encode(request ? answer(*request) : reply(Status::BadRequest), options.dialect)));
   }
 
   void lose(const std::string& text) {

@@ -13,7 +13,8 @@
 
 /// The robot's socket as a session without I/O: the robot is the client, the cell the server.
 namespace binpick::drivers::robot {
-enum class Dialect { UniversalRobots };
+/// Make of the controller: how answers are written (dialect.hpp). The conversation is the same for all.
+enum class Dialect { UniversalRobots, Fanuc, Kawasaki };
 
 struct Options {
   Dialect dialect = Dialect::UniversalRobots;

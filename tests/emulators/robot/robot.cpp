@@ -81,7 +81,7 @@ void Robot::update(TimePoint now) {
   move_on(now);
   if (!connected_) return;
   while (waiting_ != Waiting::None) {
-    const auto decoded = drivers::robot::decode_reply(received_);
+    const auto decoded = drivers::robot::decode_reply(received_, options_.dialect);
     if (!decoded) {
       fail_link("answer not understood: " + decoded.error().text);
       return;
@@ -126,11 +126,11 @@ void Robot::ask(const Request& request, Waiting waiting, TimePoint now) {
   waiting_ = waiting;
   reply_until_ = now + options_.reply_timeout + 2 * faults.delay;
   received_.clear();
-  const std::string line = encode(request);
+  const std::string line = encode(request, options_.dialect);
   std::uniform_int_distribution<int> any{0, 255};
   TimePoint at = now + faults.delay;
   for (const char c : line) {
-    const bool spoil = faults.garbage && c != '\n';
+    const bool spoil = faults.garbage && c != '\n' && c != '\r';
     due_.push_back({at, static_cast<std::byte>(spoil ? any(random_) : static_cast<unsigned char>(c))});
     if (faults.split_every_byte) at += std::chrono::milliseconds(1);
   }

@@ -15,17 +15,18 @@
 
 namespace binpick::emulators {
 struct RobotOptions {
+  drivers::robot::Dialect dialect = drivers::robot::Dialect::UniversalRobots;
   Duration poll_period = std::chrono::milliseconds(100);
-  Duration reply_timeout = std::chrono::seconds(2);  ///< As socket_read_ascii_float's: then the socket is opened anew.
+  Duration reply_timeout = std::chrono::seconds(2);  ///< Of the programs: then the socket is opened anew.
   Duration approach = std::chrono::milliseconds(600);
   Duration grasp = std::chrono::milliseconds(200);
   Duration retreat = std::chrono::milliseconds(600);
   std::uint64_t seed = 1;  ///< Of garbage.
 };
 
-/// A Universal Robots arm whose program is that of docs/robots/universal-robots.md, as the client of the cell: says
-/// hello, fetches until there is a pick, moves, reports. What the program keeps in installation variables (the open
-/// pick, and whether the part is gripped) outlives restart_program() and every lost connection. No clock, no socket.
+/// An arm whose program is that of its make's page in docs/robots/, as the client of the cell: says hello, fetches
+/// until there is a pick, moves, reports. What the program keeps in variables that survive (the open pick, and whether
+/// the part is gripped) outlives restart_program() and every lost connection. No clock, no socket.
 ///
 /// Faults: `silent` freezes the program, `error_code` is a gripper that never holds anything, `wrong_id` reports the
 /// pick under the next id, `emergency_stop` stops program and arm where they are and starts the program again when it
@@ -93,7 +94,7 @@ class Robot {
   void send(std::byte byte);
 
   RobotOptions options_;
-  // Installation variables.
+  // Variables that survive: installation variables (UR), registers (Fanuc), globals (Kawasaki).
   drivers::robot::Pick pick_;
   bool pick_open_ = false;
   bool gripped_ = false;

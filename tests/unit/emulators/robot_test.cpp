@@ -6,17 +6,20 @@
 #include <vector>
 
 #include "base/log.hpp"
+#include "base/rotation.hpp"
 #include "drivers/robot/session.hpp"
 
 namespace binpick::emulators {
 namespace {
 using namespace std::chrono_literals;
+using drivers::robot::Dialect;
 using drivers::robot::NoPick;
 using drivers::robot::Pick;
 using drivers::robot::Session;
 
-/// The cell's session and the emulated robot on one wire, in virtual time. The cell side gives one pick after another.
-class RobotPair : public testing::Test {
+/// The cell's session and the emulated robot on one wire, in virtual time, in each dialect. The cell side gives one
+/// pick after another.
+class RobotPair : public testing::TestWithParam<Dialect> {
  protected:
   RobotPair() {
     log::set_sink([](log::Level, std::string_view, std::string_view) {});
@@ -30,8 +33,16 @@ class RobotPair : public testing::Test {
   void offer() {
     ++last_id;
     Pick pick{last_id, last_id, 1, 5, {}, {}};
+    pick.T_base_approach.iso.translation() = Eigen::Vector3d{-100, 200, 400};
+    pick.T_base_approach.iso.linear() = from_wpr_deg({175, -12, -100});
     pick.T_base_grasp.iso.translation() = Eigen::Vector3d{100, 200, 300};
+    pick.T_base_grasp.iso.linear() = from_wpr_deg({180, 0, 45});  // straight down
     session.offer(pick);
+  }
+
+  void deliver(const Bytes& answer) {
+    if (!byte_by_byte) return robot.on_bytes(answer, now);
+    for (const std::byte byte : answer) robot.on_bytes(Bytes{byte}, now);
   }
 
   void pump() {
@@ -45,7 +56,7 @@ class RobotPair : public testing::Test {
       for (const Bytes& bytes : {robot.take_output()})
         if (linked && !bytes.empty()) any = true, session.on_bytes(bytes, now);
       for (const Bytes& bytes : {session.take_output()})
-        if (linked && !bytes.empty()) any = true, robot.on_bytes(bytes, now);
+        if (linked && !bytes.empty()) any = true, deliver(bytes);
       const bool closed_here = session.take_reopen(), closed_there = robot.take_reopen();
       if (linked && (closed_here || closed_there)) {
         linked = false;
@@ -105,9 +116,10 @@ class RobotPair : public testing::Test {
   }
 
   TimePoint now{1h};
-  Session session{drivers::robot::Options{}};
-  Robot robot;
+  Session session{{.dialect = GetParam()}};
+  Robot robot{{.dialect = GetParam()}};
   bool linked = false, offers_more = true, object_is_there = true;
+  bool byte_by_byte = false;  // how answers reach the robot
   TimePoint link_again{};
   std::uint16_t last_id = 0;
   std::map<std::uint16_t, int> grasps, done, failed;
@@ -116,7 +128,10 @@ class RobotPair : public testing::Test {
 };
 }  // namespace
 
-TEST_F(RobotPair, PicksOneAfterAnother) {
+INSTANTIATE_TEST_SUITE_P(EachMake, RobotPair,
+                         testing::Values(Dialect::UniversalRobots, Dialect::Fanuc, Dialect::Kawasaki));
+
+TEST_P(RobotPair, PicksOneAfterAnother) {
   run_for(1s);
   EXPECT_EQ(count<Robot::NoPickRead>(), 1) << "told when it changes, not at each poll";
   offer();
@@ -127,7 +142,7 @@ TEST_F(RobotPair, PicksOneAfterAnother) {
   expect_each_pick_once();
 }
 
-TEST_F(RobotPair, IsInTheViewFromTheStartOfTheApproachToTheEndOfTheRetreat) {
+TEST_P(RobotPair, IsInTheViewFromTheStartOfTheApproachToTheEndOfTheRetreat) {
   offers_more = false;
   run_for(1s);
   EXPECT_TRUE(robot.clear_of_view());
@@ -141,17 +156,20 @@ TEST_F(RobotPair, IsInTheViewFromTheStartOfTheApproachToTheEndOfTheRetreat) {
   EXPECT_EQ(done[1], 1);
 }
 
-TEST_F(RobotPair, ReadsThePoseThatWasOffered) {
+TEST_P(RobotPair, ReadsThePoseThatWasOffered) {
   offer();
   run_for(500ms);
   ASSERT_EQ(count<Robot::PickRead>(), 1);
   for (const auto& event : events)
     if (const auto* read = std::get_if<Robot::PickRead>(&event)) {
+      EXPECT_TRUE(read->pick.T_base_approach.iso.translation().isApprox(Eigen::Vector3d{-100, 200, 400}, 1e-9));
+      EXPECT_TRUE(read->pick.T_base_approach.iso.linear().isApprox(from_wpr_deg({175, -12, -100}), 1e-6));
       EXPECT_TRUE(read->pick.T_base_grasp.iso.translation().isApprox(Eigen::Vector3d{100, 200, 300}, 1e-9));
+      EXPECT_TRUE(read->pick.T_base_grasp.iso.linear().isApprox(from_wpr_deg({180, 0, 45}), 1e-6));
     }
 }
 
-TEST_F(RobotPair, AnEmptyGripperIsReportedAsFailed) {
+TEST_P(RobotPair, AnEmptyGripperIsReportedAsFailed) {
   object_is_there = false;
   offer();
   run_for(10s);
@@ -165,7 +183,7 @@ TEST_F(RobotPair, AnEmptyGripperIsReportedAsFailed) {
   EXPECT_GT(total(failed), before);
 }
 
-TEST_F(RobotPair, AProgramRestartedAtAnyMomentGoesOn) {
+TEST_P(RobotPair, AProgramRestartedAtAnyMomentGoesOn) {
   offer();
   for (int i = 0; i < 400; ++i) {
     run_for(std::chrono::milliseconds(37 * (i % 60)));
@@ -177,7 +195,7 @@ TEST_F(RobotPair, AProgramRestartedAtAnyMomentGoesOn) {
   expect_each_pick_once();
 }
 
-TEST_F(RobotPair, AConnectionCutAfterAnyByteLosesNothing) {
+TEST_P(RobotPair, AConnectionCutAfterAnyByteLosesNothing) {
   offer();
   for (std::size_t n = 0; n < 200; ++n) {
     robot.faults.disconnect_after_bytes = n % 40;
@@ -189,7 +207,7 @@ TEST_F(RobotPair, AConnectionCutAfterAnyByteLosesNothing) {
   expect_each_pick_once();
 }
 
-TEST_F(RobotPair, EmergencyStopAtAnyMomentStopsEverythingAndThenItGoesOn) {
+TEST_P(RobotPair, EmergencyStopAtAnyMomentStopsEverythingAndThenItGoesOn) {
   offer();
   for (int i = 0; i < 100; ++i) {
     run_for(std::chrono::milliseconds(53 * (i % 40)));
@@ -208,7 +226,7 @@ TEST_F(RobotPair, EmergencyStopAtAnyMomentStopsEverythingAndThenItGoesOn) {
   expect_each_pick_once();
 }
 
-TEST_F(RobotPair, ASilentRobotIsTakenForGoneAndComesBack) {
+TEST_P(RobotPair, ASilentRobotIsTakenForGoneAndComesBack) {
   offer();
   run_for(5s);
   robot.faults.silent = true;
@@ -221,7 +239,7 @@ TEST_F(RobotPair, ASilentRobotIsTakenForGoneAndComesBack) {
   expect_each_pick_once();
 }
 
-TEST_F(RobotPair, UnpluggedAndPluggedAgain) {
+TEST_P(RobotPair, UnpluggedAndPluggedAgain) {
   offer();
   run_for(5s);
   robot.faults.unplugged = true;
@@ -234,7 +252,7 @@ TEST_F(RobotPair, UnpluggedAndPluggedAgain) {
   expect_each_pick_once();
 }
 
-TEST_F(RobotPair, GarbageIsAskedAgainAndNeverBelieved) {
+TEST_P(RobotPair, GarbageIsAskedAgainAndNeverBelieved) {
   offer();
   run_for(3s);
   robot.faults.garbage = true;
@@ -248,7 +266,7 @@ TEST_F(RobotPair, GarbageIsAskedAgainAndNeverBelieved) {
   expect_each_pick_once();
 }
 
-TEST_F(RobotPair, SlowAndTornLinesAreGoodLines) {
+TEST_P(RobotPair, SlowAndTornLinesAreGoodLines) {
   robot.faults.split_every_byte = true;
   robot.faults.delay = 300ms;
   offer();
@@ -258,7 +276,16 @@ TEST_F(RobotPair, SlowAndTornLinesAreGoodLines) {
   expect_each_pick_once();
 }
 
-TEST_F(RobotPair, AReportUnderAWrongIdIsNotTaken) {
+TEST_P(RobotPair, AnswersThatComeByteByByteAreGoodAnswers) {
+  byte_by_byte = true;
+  offer();
+  run_for(60s);
+  EXPECT_GT(total(done), 30);
+  EXPECT_EQ(count<Robot::Trouble>(), 0);
+  expect_each_pick_once();
+}
+
+TEST_P(RobotPair, AReportUnderAWrongIdIsNotTaken) {
   robot.faults.wrong_id = true;
   offer();
   run_for(10s);

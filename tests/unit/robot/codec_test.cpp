@@ -11,6 +11,9 @@ namespace binpick::drivers::robot {
 namespace {
 using Eigen::Vector3d;
 
+/// The other dialects have their own tables (dialect_test.cpp).
+constexpr Dialect kUr = Dialect::UniversalRobots;
+
 Pick example_pick() {
   Pick pick{17, 118, 2, 11, {}, {}};
   pick.T_base_approach.iso.translation() = Vector3d{1234.5678, -250, 600.0004};
@@ -40,7 +43,7 @@ std::vector<double> socket_read_ascii_float(std::size_t n, const std::string& te
 
 std::string describe(const Expected<Request, BadLine>& request) {
   if (!request) return "bad: " + to_string(request.error());
-  std::string text = encode(*request);
+  std::string text = encode(*request, kUr);
   text.pop_back();
   return text;
 }
@@ -70,7 +73,7 @@ TEST(RobotCodec, WhatIsNoRequestSaysWhy) {
 
 TEST(RobotCodec, AnswersAreTheseBytes) {
   // version, status, pick id, sequence, part, left, approach, grasp, reported id, outcome
-  EXPECT_EQ(encode(Reply{Status::NotReady, {}, 0, Outcome::None}),
+  EXPECT_EQ(encode(Reply{Status::NotReady, {}, 0, Outcome::None}, kUr),
             "(1,0,0,0,0,0,"
             "0.000000,0.000000,0.000000,0.0000000,0.0000000,0.0000000,"
             "0.000000,0.000000,0.000000,0.0000000,0.0000000,0.0000000,0,0)\n");
@@ -79,7 +82,7 @@ TEST(RobotCodec, AnswersAreTheseBytes) {
   pick.T_base_approach.iso.linear() << 1, 0, 0, 0, -1, 0, 0, 0, -1;  // half a turn about x
   pick.T_base_grasp.iso.translation() = Vector3d{-0.0123, 0, 500};
   pick.T_base_grasp.iso.linear() << 0, -1, 0, 1, 0, 0, 0, 0, 1;  // a quarter of a turn about z
-  EXPECT_EQ(encode(Reply{Status::Pick, pick, 16, Outcome::Failed}),
+  EXPECT_EQ(encode(Reply{Status::Pick, pick, 16, Outcome::Failed}, kUr),
             "(1,1,17,118,2,11,"
             "1.234568,-0.250000,0.600000,3.1415927,0.0000000,0.0000000,"
             "-0.000012,0.000000,0.500000,0.0000000,0.0000000,1.5707963,16,2)\n");
@@ -88,13 +91,13 @@ TEST(RobotCodec, AnswersAreTheseBytes) {
 TEST(RobotCodec, UrScriptReadsEveryAnswerAsTwentyNumbers) {
   for (const Reply& reply : {Reply{}, Reply{Status::Pick, example_pick(), 16, Outcome::Done},
                              Reply{Status::UnknownPick, {}, 65535, Outcome::Failed}}) {
-    const auto list = socket_read_ascii_float(20, encode(reply));
+    const auto list = socket_read_ascii_float(20, encode(reply, kUr));
     ASSERT_EQ(list.size(), 21U);
     EXPECT_EQ(list[0], 20);
     EXPECT_EQ(list[1], 1);
     EXPECT_EQ(list[2], static_cast<double>(reply.status));
   }
-  const auto list = socket_read_ascii_float(20, encode(Reply{Status::Pick, example_pick(), 16, Outcome::Done}));
+  const auto list = socket_read_ascii_float(20, encode(Reply{Status::Pick, example_pick(), 16, Outcome::Done}, kUr));
   EXPECT_EQ((std::vector<double>(list.begin() + 3, list.begin() + 7)), (std::vector<double>{17, 118, 2, 11}));
   // Metres; 180, 0, 45 of Fanuc is this rotation vector, 10, 20, 30 the other.
   const std::vector<double> approach{1.234568, -0.25, 0.6, 2.902453, 1.202235, 0};
@@ -111,9 +114,9 @@ TEST(RobotCodec, AnswersNeverHoldAnExponentAndKeepAHundredthOfAMillimetre) {
   Pick pick = example_pick();
   pick.T_base_grasp.iso.translation() = Vector3d{1e-9, 12345.678, -0.004};
   pick.T_base_grasp.iso.linear() = from_rotation_vector({1e-9, -1e-5, 0});
-  const std::string text = encode(Reply{Status::Pick, pick, 0, Outcome::None});
+  const std::string text = encode(Reply{Status::Pick, pick, 0, Outcome::None}, kUr);
   EXPECT_EQ(text.find_first_not_of("()0123456789.,-\n"), std::string::npos) << text;
-  const auto decoded = decode_reply(text);
+  const auto decoded = decode_reply(text, kUr);
   ASSERT_TRUE(decoded && *decoded);
   EXPECT_LT(((*decoded)->reply.pick.T_base_grasp.iso.translation() - pick.T_base_grasp.iso.translation()).norm(), 1e-3);
   EXPECT_LE(text.size(), 255U) << "one string of a controller";
@@ -121,33 +124,34 @@ TEST(RobotCodec, AnswersNeverHoldAnExponentAndKeepAHundredthOfAMillimetre) {
 
 TEST(RobotCodec, DecodingGivesBackWhatWasEncoded) {
   const Reply reply{Status::Pick, example_pick(), 16, Outcome::Failed};
-  const std::string text = encode(reply);
-  const auto decoded = decode_reply("\n" + text + "rest");
+  const std::string text = encode(reply, kUr);
+  const auto decoded = decode_reply("\n" + text + "rest", kUr);
   ASSERT_TRUE(decoded && *decoded);
   EXPECT_EQ((*decoded)->consumed, text.size());  // one byte before it, the line end left
-  EXPECT_EQ(encode((*decoded)->reply), encode(Reply{Status::Pick, (*decoded)->reply.pick, 16, Outcome::Failed}));
+  EXPECT_EQ(encode((*decoded)->reply, kUr),
+            encode(Reply{Status::Pick, (*decoded)->reply.pick, 16, Outcome::Failed}, kUr));
   EXPECT_EQ((*decoded)->reply.pick.pick_id, 17);
   EXPECT_EQ((*decoded)->reply.pick.objects_left, 11);
   EXPECT_TRUE((*decoded)->reply.pick.T_base_approach.iso.isApprox(reply.pick.T_base_approach.iso, 1e-5));
 }
 
 TEST(RobotCodec, EachPrefixOfAnAnswerWaitsForTheRest) {
-  const std::string text = encode(Reply{Status::Pick, example_pick(), 16, Outcome::Failed});
+  const std::string text = encode(Reply{Status::Pick, example_pick(), 16, Outcome::Failed}, kUr);
   for (std::size_t n = 0; n + 1 < text.size(); ++n) {
-    const auto decoded = decode_reply(text.substr(0, n));
+    const auto decoded = decode_reply(text.substr(0, n), kUr);
     ASSERT_TRUE(decoded.has_value()) << n;
     EXPECT_FALSE(decoded->has_value()) << n;
   }
 }
 
 TEST(RobotCodec, EachCorruptedByteOfAnAnswerIsAnErrorOrAValueInRange) {
-  const std::string text = encode(Reply{Status::Pick, example_pick(), 16, Outcome::Failed});
+  const std::string text = encode(Reply{Status::Pick, example_pick(), 16, Outcome::Failed}, kUr);
   int errors = 0;
   for (std::size_t at = 0; at < text.size(); ++at)
     for (int value = 0; value < 256; ++value) {
       std::string corrupted = text;
       corrupted[at] = static_cast<char>(value);
-      const auto decoded = decode_reply(corrupted);
+      const auto decoded = decode_reply(corrupted, kUr);
       if (!decoded) {
         ++errors;
       } else if (*decoded) {
@@ -159,12 +163,13 @@ TEST(RobotCodec, EachCorruptedByteOfAnAnswerIsAnErrorOrAValueInRange) {
 }
 
 TEST(RobotCodec, AnswersOfAnotherShapeAreRefused) {
-  for (const char* text : {"17)", "(1,2)", "(1,,0)", "(a)", "()", "(1;2)"}) EXPECT_FALSE(decode_reply(text)) << text;
+  for (const char* text : {"17)", "(1,2)", "(1,,0)", "(a)", "()", "(1;2)"})
+    EXPECT_FALSE(decode_reply(text, kUr)) << text;
   std::string endless = "(" + std::string(600, '1');
-  EXPECT_FALSE(decode_reply(endless));
-  std::string other_version = encode(Reply{});
+  EXPECT_FALSE(decode_reply(endless, kUr));
+  std::string other_version = encode(Reply{}, kUr);
   other_version[1] = '2';
-  EXPECT_FALSE(decode_reply(other_version));
+  EXPECT_FALSE(decode_reply(other_version, kUr));
 }
 
 TEST(LineReader, EachSplitGivesTheSameLines) {

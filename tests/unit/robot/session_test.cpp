@@ -6,6 +6,7 @@
 
 #include "base/log.hpp"
 #include "drivers/robot/codec.hpp"
+#include "drivers/robot/dialect.hpp"
 
 namespace binpick::drivers::robot {
 namespace {
@@ -19,8 +20,8 @@ Pick pick(std::uint16_t id) {
   return value;
 }
 
-/// A session and what a robot on the other end of the wire sees of it.
-class RobotSession : public testing::Test {
+/// A session and what a robot on the other end of the wire sees of it, of each make.
+class RobotSession : public testing::TestWithParam<Dialect> {
  protected:
   RobotSession() {
     log::set_sink([this](log::Level, std::string_view, std::string_view) { ++log_lines; });
@@ -36,12 +37,12 @@ class RobotSession : public testing::Test {
   /// One request, one answer.
   Reply ask(std::string_view text) {
     const std::string answer = send(text);
-    const auto decoded = decode_reply(answer);
+    const auto decoded = decode_reply(answer, GetParam());
     if (!decoded || !*decoded) {
       ADD_FAILURE() << "no answer to " << text << ": " << answer;
       return {};
     }
-    EXPECT_EQ((*decoded)->consumed + 1, answer.size()) << "exactly one group and a line end";
+    EXPECT_EQ((*decoded)->consumed + format_of(GetParam()).end.size(), answer.size()) << "exactly one answer";
     EXPECT_EQ(answer.back(), '\n');
     return (*decoded)->reply;
   }
@@ -60,19 +61,21 @@ class RobotSession : public testing::Test {
   using Texts = std::vector<std::string>;
 
   TimePoint now = kStart;
-  Session session{Options{}};
+  Options options() const { return {.dialect = GetParam()}; }
+  Session session{options()};
   int log_lines = 0;
 };
 }  // namespace
 
-TEST_F(RobotSession, BeforeAPickIsReadyTheAnswerSaysSo) {
-  EXPECT_EQ(send("fetch\n"),
-            "(1,0,0,0,0,0,0.000000,0.000000,0.000000,0.0000000,0.0000000,0.0000000,"
-            "0.000000,0.000000,0.000000,0.0000000,0.0000000,0.0000000,0,0)\n");
+INSTANTIATE_TEST_SUITE_P(EachMake, RobotSession,
+                         testing::Values(Dialect::UniversalRobots, Dialect::Fanuc, Dialect::Kawasaki));
+
+TEST_P(RobotSession, BeforeAPickIsReadyTheAnswerSaysSo) {
+  EXPECT_EQ(send("fetch\n"), encode(Reply{}, GetParam()));
   EXPECT_TRUE(events().empty());
 }
 
-TEST_F(RobotSession, EachReasonForNoPickHasItsStatus) {
+TEST_P(RobotSession, EachReasonForNoPickHasItsStatus) {
   for (const auto& [reason, status] : {std::pair{NoPick::NotReady, 0},
                                        {NoPick::SupplyEmpty, 10},
                                        {NoPick::NothingFound, 11},
@@ -83,12 +86,10 @@ TEST_F(RobotSession, EachReasonForNoPickHasItsStatus) {
   }
 }
 
-TEST_F(RobotSession, TheSamePickUnderTheSameIdUntilItIsReported) {
+TEST_P(RobotSession, TheSamePickUnderTheSameIdUntilItIsReported) {
   session.offer(pick(7));
   const std::string first = send("fetch\n");
-  EXPECT_EQ(first,
-            "(1,1,7,107,1,9,1.000000,0.020000,0.400000,0.0000000,0.0000000,0.0000000,"
-            "1.000000,0.020000,0.300000,0.0000000,0.0000000,0.0000000,0,0)\n");
+  EXPECT_EQ(first, encode(Reply{Status::Pick, pick(7), 0, Outcome::None}, GetParam()));
   EXPECT_EQ(send("fetch\n"), first);
   EXPECT_EQ(events(), (Texts{"fetched 7", "fetched 7"}));
   const Reply taken = ask("done 7\n");
@@ -102,7 +103,7 @@ TEST_F(RobotSession, TheSamePickUnderTheSameIdUntilItIsReported) {
   EXPECT_EQ(after.reported_id, 7);
 }
 
-TEST_F(RobotSession, ARepeatedReportIsAnsweredAgainAndCountsOnce) {
+TEST_P(RobotSession, ARepeatedReportIsAnsweredAgainAndCountsOnce) {
   session.offer(pick(7));
   ask("fetch\n");
   ask("failed 7\n");
@@ -115,7 +116,7 @@ TEST_F(RobotSession, ARepeatedReportIsAnsweredAgainAndCountsOnce) {
   EXPECT_TRUE(events().empty());
 }
 
-TEST_F(RobotSession, AReportOfAnotherPickIsAnsweredAndChangesNothing) {
+TEST_P(RobotSession, AReportOfAnotherPickIsAnsweredAndChangesNothing) {
   session.offer(pick(7));
   ask("fetch\n");
   events();
@@ -127,13 +128,13 @@ TEST_F(RobotSession, AReportOfAnotherPickIsAnsweredAndChangesNothing) {
   EXPECT_TRUE(session.connected());
 }
 
-TEST_F(RobotSession, ARobotThatGotThePickFromThePlcMayReportItHere) {
+TEST_P(RobotSession, ARobotThatGotThePickFromThePlcMayReportItHere) {
   session.offer(pick(7));
   EXPECT_EQ(ask("done 7\n").status, Status::ReportTaken);
   EXPECT_EQ(events(), Texts{"done 7"});
 }
 
-TEST_F(RobotSession, AWithdrawnPickIsNotGivenButItsReportIsTaken) {
+TEST_P(RobotSession, AWithdrawnPickIsNotGivenButItsReportIsTaken) {
   session.offer(pick(7));
   ask("fetch\n");
   session.withdraw(NoPick::NotReady);
@@ -145,7 +146,7 @@ TEST_F(RobotSession, AWithdrawnPickIsNotGivenButItsReportIsTaken) {
   EXPECT_TRUE(events().empty());
 }
 
-TEST_F(RobotSession, ANewOfferClosesTheOldPick) {
+TEST_P(RobotSession, ANewOfferClosesTheOldPick) {
   session.offer(pick(7));
   ask("fetch\n");
   session.offer(pick(8));
@@ -153,7 +154,7 @@ TEST_F(RobotSession, ANewOfferClosesTheOldPick) {
   EXPECT_EQ(ask("fetch\n").pick.pick_id, 8);
 }
 
-TEST_F(RobotSession, AnIdThatComesRoundIsANewPick) {
+TEST_P(RobotSession, AnIdThatComesRoundIsANewPick) {
   session.offer(pick(7));
   ask("fetch\n");
   ask("done 7\n");
@@ -164,7 +165,7 @@ TEST_F(RobotSession, AnIdThatComesRoundIsANewPick) {
   EXPECT_EQ(events(), (Texts{"fetched 7", "failed 7"}));
 }
 
-TEST_F(RobotSession, HelloTellsWhatIsOnRecord) {
+TEST_P(RobotSession, HelloTellsWhatIsOnRecord) {
   session.offer(pick(6));
   ask("fetch\n");
   ask("failed 6\n");
@@ -176,19 +177,19 @@ TEST_F(RobotSession, HelloTellsWhatIsOnRecord) {
   EXPECT_EQ(hello.outcome, Outcome::Failed);
 }
 
-TEST_F(RobotSession, EachByteSplitGivesTheSameAnswers) {
+TEST_P(RobotSession, EachByteSplitGivesTheSameAnswers) {
   const std::string text = "hello\nfetch\ndone 7\nfetch\n";
   session.offer(pick(7));
   std::string whole;
   {
-    Session other{Options{}};
+    Session other{options()};
     other.on_connected(now);
     other.offer(pick(7));
     other.on_bytes(as_bytes(text), now);
     whole = as_text(other.take_output());
   }
   for (std::size_t split = 0; split <= text.size(); ++split) {
-    Session other{Options{}};
+    Session other{options()};
     other.on_connected(now);
     other.offer(pick(7));
     other.on_bytes(as_bytes(text.substr(0, split)), now);
@@ -199,12 +200,12 @@ TEST_F(RobotSession, EachByteSplitGivesTheSameAnswers) {
   }
 }
 
-TEST_F(RobotSession, AProgramRestartedAtAnyByteFindsItsPickAgain) {
+TEST_P(RobotSession, AProgramRestartedAtAnyByteFindsItsPickAgain) {
   const std::string script = "hello\nfetch\ndone 7\n";
   for (std::size_t cut = 0; cut <= script.size(); ++cut)
     for (const bool reconnects : {true, false}) {
       SCOPED_TRACE("cut at " + std::to_string(cut) + (reconnects ? ", new connection" : ", same connection"));
-      session = Session{Options{}};
+      session = Session{options()};
       session.on_connected(now);
       session.offer(pick(7));
       send(script.substr(0, cut));
@@ -233,7 +234,7 @@ TEST_F(RobotSession, AProgramRestartedAtAnyByteFindsItsPickAgain) {
     }
 }
 
-TEST_F(RobotSession, GarbageIsAnsweredCountedAndLoggedOnce) {
+TEST_P(RobotSession, GarbageIsAnsweredCountedAndLoggedOnce) {
   for (const char* line : {"GET / HTTP/1.1\r\n", "\xff\xfe\n", "fetch me\n", "done x\n"})
     EXPECT_EQ(ask(line).status, Status::BadRequest) << line;
   EXPECT_EQ(ask(std::string(100'000, 'a') + "\n").status, Status::BadRequest);
@@ -244,18 +245,18 @@ TEST_F(RobotSession, GarbageIsAnsweredCountedAndLoggedOnce) {
   EXPECT_TRUE(events().size() == 1 && session.connected());
 }
 
-TEST_F(RobotSession, EachCorruptedByteOfAReportIsAnsweredOnceItsLineEnds) {
+TEST_P(RobotSession, EachCorruptedByteOfAReportIsAnsweredOnceItsLineEnds) {
   const std::string line = "failed 17\n";
   for (std::size_t at = 0; at + 1 < line.size(); ++at)
     for (int value = 0; value < 256; ++value) {
-      session = Session{Options{}};
+      session = Session{options()};
       session.on_connected(now);
       session.offer(pick(17));
       std::string corrupted = line;
       corrupted[at] = static_cast<char>(value);
       const std::string answers = send(corrupted);
       if (value == '\n' && at == 0) continue;  // an empty line and "ailed 17"
-      const auto decoded = decode_reply(answers);
+      const auto decoded = decode_reply(answers, GetParam());
       ASSERT_TRUE(decoded && *decoded) << at << " " << value;
       const Status status = (*decoded)->reply.status;
       EXPECT_TRUE(status == Status::ReportTaken || status == Status::UnknownPick || status == Status::BadRequest);
@@ -263,7 +264,7 @@ TEST_F(RobotSession, EachCorruptedByteOfAReportIsAnsweredOnceItsLineEnds) {
     }
 }
 
-TEST_F(RobotSession, SilenceIsNoticedAndTheConnectionClosed) {
+TEST_P(RobotSession, SilenceIsNoticedAndTheConnectionClosed) {
   EXPECT_EQ(session.deadline(), kStart + 60s);
   now = kStart + 50s;
   ask("hello\n");
@@ -280,7 +281,7 @@ TEST_F(RobotSession, SilenceIsNoticedAndTheConnectionClosed) {
   EXPECT_TRUE(events().empty()) << "told once";
 }
 
-TEST_F(RobotSession, ANewConnectionReplacesTheOldOneAndKeepsThePick) {
+TEST_P(RobotSession, ANewConnectionReplacesTheOldOneAndKeepsThePick) {
   session.offer(pick(7));
   ask("fetch\n");
   send("don");
@@ -289,7 +290,7 @@ TEST_F(RobotSession, ANewConnectionReplacesTheOldOneAndKeepsThePick) {
   EXPECT_EQ(session.bad_lines(), 0U) << "half a line of the old connection is forgotten";
 }
 
-TEST_F(RobotSession, ADisconnectedRobotIsToldOnceAndComesBack) {
+TEST_P(RobotSession, ADisconnectedRobotIsToldOnceAndComesBack) {
   session.offer(pick(7));
   ask("fetch\n");
   events();
@@ -302,7 +303,7 @@ TEST_F(RobotSession, ADisconnectedRobotIsToldOnceAndComesBack) {
   EXPECT_EQ(events(), (Texts{"connected", "done 7"}));
 }
 
-TEST_F(RobotSession, ARobotThatNeverReadsIsDropped) {
+TEST_P(RobotSession, ARobotThatNeverReadsIsDropped) {
   std::string flood;
   for (int i = 0; i < 10'000; ++i) flood += "x\n";
   EXPECT_EQ(send(flood), "");
