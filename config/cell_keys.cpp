@@ -173,9 +173,14 @@ const std::vector<Section<Config>>& cell_sections() {
       {"robot",
        "The socket that the robot's program fetches picks from (docs/robots/).",
        {
-           {{.name = "dialect", .type = Choice, .default_value = "\"ur\"", .change = kRestart, .choices = {"ur"},
-             .help = "ur: Universal Robots."},
-            [](C& c) -> Slot { return chosen(c.robot.dialect, {drivers::robot::Dialect::UniversalRobots}); }},
+           {{.name = "dialect", .type = Choice, .default_value = "\"ur\"", .change = kRestart,
+             .choices = {"ur", "fanuc", "kawasaki"},
+             .help = "Make of the controller: how answers are written to its socket. ur: metres and a rotation vector, "
+                     "fanuc: mm and W P R in degrees, kawasaki: mm and O A T in degrees (docs/robots/)."},
+            [](C& c) -> Slot {
+              using enum drivers::robot::Dialect;
+              return chosen(c.robot.dialect, {UniversalRobots, Fanuc, Kawasaki});
+            }},
            {{.name = "listen", .type = Endpoint, .default_value = "\"\"", .example = "\"0.0.0.0:5002\"",
              .change = kRestart,
              .help = "Address and port to listen on; empty: no robot connects, the PLC forwards the movement."},

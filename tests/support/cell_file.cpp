@@ -22,7 +22,7 @@ std::string to_toml(const CellFile& file) {
   std::ostringstream out;
   out << "[cell]\nname = \"test\"\nstate_dir = \"" << file.state_dir << "\"\npicture_dir = \"" << file.picture_dir
       << "\"\n\n[plc]\nlisten = \"127.0.0.1:" << file.plc_port << "\"\nword_order = \"" << file.word_order
-      << "\"\nallow = []\ndetect_timeout_ms = " << file.detect_timeout_ms
+      << "\"\npose_convention = \"" << file.robot << "\"\nallow = []\ndetect_timeout_ms = " << file.detect_timeout_ms
       << "\n\n[pivot]\ncan = \"cannelloni://127.0.0.1:" << file.can_port
       << "\"\ncan_listen_port = " << file.can_listen_port
       << "\nmodule_id = 12\nT_base_pivot = { xyz_mm = [1200, 0, 1860], rpy_deg = [0, 90, 0] }\n\n"
@@ -30,7 +30,7 @@ std::string to_toml(const CellFile& file) {
       << "\"\nfrequency_hz = " << file.frequency_hz << "\nresolution_deg = " << file.resolution_deg
       << "\nstart_deg = 70\nrange_deg = 40\nlatency_ms = " << file.scanner_latency_ms
       << "\nT_pivot_scanner = { xyz_mm = [60, 0, 0], rpy_deg = [180, -90, 0] }\n\n"
-      << "[robot]\ndialect = \"ur\"\nsilence_max_s = 5\nlisten = \""
+      << "[robot]\ndialect = \"" << file.robot << "\"\nsilence_max_s = 5\nlisten = \""
       << (file.robot_port == 0 ? "" : "127.0.0.1:" + std::to_string(file.robot_port)) << "\"\nallow = []\n\n"
       << "[reach]\ntilt_max_deg = " << file.tilt_max_deg << "\n\n[detection]\nthreads = 2\ndeadline_ms = 4500\n\n"
       << "[[supply]]\nid = 1\nname = \"lattice box\"\nsize_mm = [1000, 800, 500]\n"

@@ -11,6 +11,7 @@ namespace binpick::support {
 /// What tests vary in a cell file; the rest is one LMS 400 cell: a lattice box under a pivot.
 struct CellFile {
   std::string word_order = "s7";
+  std::string robot = "ur";                         ///< robot.dialect and plc.pose_convention.
   std::vector<std::string> parts = {"track_link"};  ///< Example parts that the build has trained; ids 1, 2, ….
   double tilt_max_deg = 45;
   double score_min = 0.5;

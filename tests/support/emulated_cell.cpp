@@ -19,6 +19,12 @@ emulators::PivotOptions pivot_options(const config::Config& config, std::uint64_
   return options;
 }
 
+emulators::RobotOptions robot_options(const config::Config& config) {
+  emulators::RobotOptions options;
+  options.dialect = config.robot.dialect;
+  return options;
+}
+
 emulators::ScannerPlace scanner_place(const config::Config& config) {
   return {config.mount.T_base_pivot, config.mount.T_pivot_scanner, config.supplies.front().T_base_supply};
 }
@@ -36,6 +42,7 @@ EmulatedCell::EmulatedCell(std::shared_ptr<const daemon::CellData> data, emulato
       scanner{emulators::ScannerView{world, scanner_place(data->config),
                                      [this](TimePoint at) { return pivot.angle_at(at); }, noise(seed)}},
       plc{plc_options(data->config)},
+      robot{robot_options(data->config)},
       data_{std::move(data)},
       plc_wire_{plc_wire()},
       scanner_wire_{scanner_wire()},

@@ -22,7 +22,8 @@ namespace binpick::support {
 /// jumps to whoever wants to wake first; minutes of a plant take as long as the work in them.
 class EmulatedCell {
  public:
-  /// The emulated PLC speaks the word order and the convention of the cell file. The daemon is started.
+  /// The emulated PLC speaks the word order and the convention of the cell file, the robot its dialect. The daemon is
+  /// started.
   EmulatedCell(std::shared_ptr<const daemon::CellData> data, emulators::World scene, std::uint64_t seed = 1);
 
   emulators::World world;

@@ -94,7 +94,7 @@ int main(int argc, char** argv) {
   device(Device::Plc, "the PLC, as Modbus/TCP client of the daemon");
   device(Device::Pivot, "the Schunk PR 70 on its CAN bus");
   device(Device::Scanner, "the SICK LMS 400 over the emulated pivot and bin");
-  device(Device::Robot, "the Universal Robots arm, as client of the daemon");
+  device(Device::Robot, "the arm of the make that robot.dialect names, as client of the daemon");
   auto* cell = app.add_subcommand("cell", "all four");
   cell->fallthrough();
   auto* parts = app.add_subcommand("parts", "write the four example parts (meshes and PART.toml) and end");

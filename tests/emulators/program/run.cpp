@@ -82,7 +82,7 @@ void Run::open_devices() {
     if (config_.robot_listen.empty())
       throw std::runtime_error("robot.listen is empty: this cell's PLC moves the robot");
     robot_ = std::make_unique<RobotPort>(loop_, daemon_at(config_.robot_listen, options_.daemon_host, "robot.listen"),
-                                         Robot{{.seed = options_.bin.seed}});
+                                         Robot{{.dialect = config_.robot.dialect, .seed = options_.bin.seed}});
     robot_->device.on_grasp = [this](const drivers::robot::Pick& pick) {
       picks_[pick.pick_id].nearest = bin_.nearest(pick.T_base_grasp);
       return bin_.take(pick.T_base_grasp);

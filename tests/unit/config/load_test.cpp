@@ -56,6 +56,17 @@ TEST(Load, RotationsAreAboutFixedAxesXThenYThenZ) {
   EXPECT_EQ(T.translation(), Eigen::Vector3d(1201, 2, 1863));
 }
 
+TEST(Load, EachMakeOfRobotHasItsDialect) {
+  using enum drivers::robot::Dialect;
+  for (const auto& [name, dialect] : {std::pair{"ur", UniversalRobots}, {"fanuc", Fanuc}, {"kawasaki", Kawasaki}}) {
+    CellFolder folder;
+    folder.edit("dialect = \"ur\"", std::string("dialect = \"") + name + "\"");
+    const auto loaded = folder.load();
+    ASSERT_TRUE(loaded.has_value()) << folder.findings();
+    EXPECT_EQ(loaded->robot.dialect, dialect) << name;
+  }
+}
+
 TEST(Load, AbsentKeysHaveTheTablesDefaults) {
   CellFolder folder;
   folder.cell = R"([pivot]
