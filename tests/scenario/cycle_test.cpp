@@ -12,15 +12,28 @@ namespace binpick::support {
 namespace {
 using namespace std::chrono_literals;
 
-CellFile with(const std::string& word_order) {
+/// A make of robot and of PLC.
+struct Makes {
+  const char* word_order;
+  const char* robot;
+};
+
+CellFile with(const Makes& makes) {
   CellFile file;
-  file.word_order = word_order;
+  file.word_order = makes.word_order;
+  file.robot = makes.robot;
   return file;
+}
+
+/// Between two poses that should be the same: mm, and degrees.
+std::pair<double, double> apart(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
+  const Eigen::AngleAxisd turn{a.linear().transpose() * b.linear()};
+  return {(a.translation() - b.translation()).norm(), Angle::rad(turn.angle()).in_deg()};
 }
 
 constexpr std::uint16_t kClear = plc::control::kRobotClear;
 
-struct WholePick : testing::TestWithParam<const char*> {};
+struct WholePick : testing::TestWithParam<Makes> {};
 }  // namespace
 
 TEST_P(WholePick, FromThePlcsRequestToTheRobotsReport) {
@@ -45,8 +58,12 @@ TEST_P(WholePick, FromThePlcsRequestToTheRobotsReport) {
   ASSERT_TRUE(grasped.has_value());
   EXPECT_EQ(grasped->pick_id, result->pick_id);
   EXPECT_EQ(grasped->sequence, result->sequence);
-  EXPECT_TRUE(grasped->T_base_grasp.iso.isApprox(result->T_base_grasp.iso, 1e-3));
-  EXPECT_TRUE(grasped->T_base_approach.iso.isApprox(result->T_base_approach.iso, 1e-3));
+  for (const auto& [at_robot, at_plc] : {std::pair{grasped->T_base_grasp.iso, result->T_base_grasp.iso},
+                                         {grasped->T_base_approach.iso, result->T_base_approach.iso}}) {
+    const auto [mm, deg] = apart(at_robot, at_plc);
+    EXPECT_LT(mm, 0.01);
+    EXPECT_LT(deg, 0.001);
+  }
 
   // And the pose is right: the detection that it came from lies on one of the objects.
   ASSERT_FALSE(cell.results().empty());
@@ -55,8 +72,18 @@ TEST_P(WholePick, FromThePlcsRequestToTheRobotsReport) {
   const auto error = error_to_nearest(cell.world, cell.cell().data().knowledge_bases.front(), chosen.T_supply_object);
   EXPECT_LT(error.centroid_mm, 5.0);
   EXPECT_LT(Angle::rad(error.angle_rad).in_deg(), 3.0);
+
+  // The arm stands where that detection has the grasp, and so within the same tolerance of an object.
+  const auto& data = cell.cell().data();
+  const auto T_supply_grasp = data.config.supplies.front().T_base_supply.inverse() * grasped->T_base_grasp;
+  const auto [mm, deg] = apart(T_supply_grasp.iso, seen.choice.reachable.front().T_supply_grasp.iso);
+  EXPECT_LT(mm, 0.01);
+  EXPECT_LT(deg, 0.001);
 }
-INSTANTIATE_TEST_SUITE_P(BothWordOrders, WholePick, testing::Values("s7", "logix"));
+INSTANTIATE_TEST_SUITE_P(EachMake, WholePick,
+                         testing::Values(Makes{"s7", "ur"}, Makes{"logix", "ur"}, Makes{"s7", "fanuc"},
+                                         Makes{"logix", "kawasaki"}),
+                         [](const auto& each) { return std::string(each.param.word_order) + "_" + each.param.robot; });
 
 TEST(Cycle, AScannerThatFallsSilentJustBeforeTheEndIsAFaultNotAnEmptySupply) {
   EmulatedCell cell{test_folder().load(coarse_cell()), empty_scene()};
