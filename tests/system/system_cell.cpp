@@ -87,7 +87,7 @@ SystemCell::SystemCell(CellFile file, emulators::World scene) : file_{std::move(
       loop_, config_->scanner_address,
       emulators::ScannerView{world_, place, [this](TimePoint at) { return pivot_->angle_at(at); }}, 1);
   robot_ = std::make_unique<emulators::RobotPort>(loop_, *drivers::link::parse_endpoint(config_->robot_listen),
-                                                  emulators::Robot{});
+                                                  emulators::Robot{{.dialect = config_->robot.dialect}});
   plc_ = std::make_unique<emulators::PlcPort>(loop_, *drivers::link::parse_endpoint(config_->plc_listen),
                                               emulators::Plc{});
   start_daemon();
