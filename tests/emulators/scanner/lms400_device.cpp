@@ -16,7 +16,7 @@ constexpr std::uint32_t kAccessDenied = 0x1, kUnknownMethod = 0x2, kUnknownVaria
                         kTooFewArguments = 0x8, kWriteDenied = 0xA, kUnknownCommand = 0xC, kBusy = 0xD;
 /// A host that cannot keep up loses lines. Those that are sent are hardly late, as a device's: on a busy machine that
 /// would turn the picture by what the pivot moves meanwhile.
-constexpr Duration kLagMax = std::chrono::milliseconds(4);
+constexpr Duration kLagMax = std::chrono::milliseconds(8);
 
 double rounded(double value, double step) { return step > 0 ? std::round(value / step) * step : value; }
 }  // namespace
