@@ -276,17 +276,26 @@ class Detecting {
   std::vector<Hypothesis> tested(const std::vector<Eigen::Vector3f>& maxima, const std::vector<Ballot>& ballots) {
     report_.hypotheses += ballots.size();
     const float tolerance = coarse_tolerance_mm();
-    std::vector<float> evidence(ballots.size(), -1);
+    // Votes point at the first anchor; the maximum that is near may be another one.
+    std::vector<Hypothesis> best(ballots.size());
     constexpr std::size_t kBlock = 64;
     share(options_.threads, (ballots.size() + kBlock - 1) / kBlock, deadline_, [&](std::size_t block, int) {
-      for (std::size_t i = block * kBlock; i < std::min(ballots.size(), (block + 1) * kBlock); ++i)
-        evidence[i] = sparse_evidence(scene_, part_, ballots[i].view, maxima[ballots[i].maximum], tolerance);
+      for (std::size_t i = block * kBlock; i < std::min(ballots.size(), (block + 1) * kBlock); ++i) {
+        const View& view = part_.views[ballots[i].view];
+        const Eigen::Vector3f& maximum = maxima[ballots[i].maximum];
+        const std::size_t anchors = with("all anchors") ? view.anchors_object_mm.size() : 1;
+        for (std::size_t k = 0; k < anchors; ++k) {
+          const Eigen::Vector3f first =
+              maximum - view.R_supply_object * (view.anchors_object_mm[k] - view.anchors_object_mm.front());
+          const float evidence = sparse_evidence(scene_, part_, ballots[i].view, first, tolerance);
+          if (evidence > best[i].evidence)
+            best[i] = {ballots[i].maximum, ballots[i].view, pose_at(maximum, view, k), evidence};
+        }
+      }
     });
     std::vector<Hypothesis> hypotheses;
-    for (std::size_t i = 0; i < ballots.size(); ++i)
-      if (evidence[i] > 0)
-        hypotheses.push_back({ballots[i].maximum, ballots[i].view,
-                              pose_at(maxima[ballots[i].maximum], part_.views[ballots[i].view]), evidence[i]});
+    for (const Hypothesis& h : best)
+      if (h.evidence > 0) hypotheses.push_back(h);
     keep_best(hypotheses);
     return hypotheses;
   }
