@@ -96,7 +96,7 @@ void draw(benchmark::State& state) {
   Template drawn;
   std::size_t k = 0;
   for (auto _ : state) {
-    s.part.draw(s.poses[k].R, s.poses[k].t, s.scene.pixel_mm, s.scene.origin_mm, drawn, false);
+    s.part.draw(s.poses[k].R, s.poses[k].t, s.scene.pixel_mm, s.scene.origin_mm, drawn);
     benchmark::DoNotOptimize(drawn.top_mm.data());
     k = (k + 1) % s.poses.size();
   }

@@ -59,7 +59,7 @@ Candidate Finisher::finished(Pose pose, Template& drawn) const {
   options.gate_to_mm = 2 * tolerance;
   options.edge_gate_from_px = edge_gate_px(4, 0.04);
   for (int round = 0; round < (options_.second_refinement ? 2 : 1); ++round) {
-    rasteriser_.draw(pose.R, pose.t, scene_.pixel_mm, scene_.origin_mm, drawn, false);
+    rasteriser_.draw(pose.R, pose.t, scene_.pixel_mm, scene_.origin_mm, drawn);
     if (round > 0 && (candidate.test = dense_test(scene_, rasteriser_, pose, drawn)).evidence < 0) break;
     const ModelPoints points = model_points(scene_, rasteriser_, pose, drawn, 400, edge_points);
     candidate.information = refine(scene_, points, pose.R * centroid_ + pose.t, options, pose);
@@ -69,7 +69,7 @@ Candidate Finisher::finished(Pose pose, Template& drawn) const {
   }
   candidate.pose = pose;
   if (candidate.test.evidence < 0) return candidate;  // hopeless
-  rasteriser_.draw(pose.R, pose.t, scene_.pixel_mm, scene_.origin_mm, drawn, false);
+  rasteriser_.draw(pose.R, pose.t, scene_.pixel_mm, scene_.origin_mm, drawn);
   candidate.test = dense_test(scene_, rasteriser_, pose, drawn);
   const Absent absent = absent_pixels(scene_, *shadows_, rasteriser_, pose.R, drawn);
   candidate.test.holes = absent.holes;

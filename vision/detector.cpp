@@ -46,9 +46,9 @@ constexpr double kScoreMin = 0.1;
 /// From this on a pose is valid by itself.
 constexpr double kValidScore = 0.5;
 
-constexpr std::array<std::string_view, 10> kAdditions{"edges", "first look",       "turned",      "weighed turns",
-                                                      "rooms", "explain away",     "second pass", "all anchors",
-                                                      "known", "second refinement"};
+constexpr std::array<std::string_view, 9> kAdditions{"edges",         "first look",   "turned",
+                                                     "weighed turns", "explain away", "second pass",
+                                                     "all anchors",   "known",        "second refinement"};
 
 /// The memory of the last scene, for the next one of this thread.
 Scene& spare_scene() {
@@ -360,7 +360,7 @@ class Detecting {
       const Pose& pose = standing[i]->pose;
       Template drawn;
       std::vector<PixelState> states;
-      finish_.rasteriser().draw(pose.R, pose.t, scene_.pixel_mm, scene_.origin_mm, drawn, false);
+      finish_.rasteriser().draw(pose.R, pose.t, scene_.pixel_mm, scene_.origin_mm, drawn);
       compare(scene_, finish_.rasteriser(), pose, drawn, states);
       for (int row = 0; row < drawn.rows; ++row)
         for (int col = 0; col < drawn.cols; ++col)
@@ -383,7 +383,6 @@ class Detecting {
     options.score_min = kScoreMin;
     options.content = bounds_->content(scene_);
     options.outside = [this](const Pose& pose) { return against(pose); };
-    options.rooms = with("rooms");
     options.explain_away = with("explain away");
     options.ask_known = with("known") && !deadline_.expired();
     return options;

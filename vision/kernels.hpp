@@ -45,12 +45,9 @@ inline constexpr std::size_t kNormalSums = 27;
 /// What a mesh is drawn on: pixel (row, col) is [row * stride + col]; stride is at least cols + kLanes.
 struct Canvas {
   float* top_mm = nullptr;           ///< Starts at -infinity.
-  float* bottom_mm = nullptr;        ///< Starts at +infinity.
   std::int32_t* triangle = nullptr;  ///< Of the top surface.
   int rows = 0, cols = 0, stride = 0;
 };
-/// Which of the canvas's surfaces a triangle may belong to.
-enum class Faces { Both, Top, ByOrientation };
 
 /// A template: pixel (row, col) is [row * stride + col], and lies on pixel (row + row0, col + col0) of the picture.
 /// kMargin pixels around it can be read as well, and kLanes more to the right of them.
@@ -120,9 +117,9 @@ struct Table {
   /// n points (x of all, y of all, z of all) moved; x and y of the low and high corner around them go to `box`.
   void (*move_points)(const Motion& motion, const float* points, std::size_t n, float* moved, float* box);
   /// Draws triangles, given by the indices of their corners (all first corners, all second, all third; `count` is a
-  /// multiple of eight) into n points in pixels of the canvas.
+  /// multiple of eight) into n points in pixels of the canvas; only those that look up, or all.
   void (*draw)(const Canvas& canvas, const float* points, std::size_t n, const std::int32_t* corners, std::size_t count,
-               Faces faces);
+               bool upward_only);
 
   /// n unit normals (x of all, y of all, z of all) turned, made to look up; then how far from a surface that lies so a
   /// height may be: the tolerance and `per_slope_mm` times the rise per distance. `faces` has room for 4 n.

@@ -45,7 +45,7 @@ class WorkingRenderer final : public DepthRenderer {
   explicit WorkingRenderer(const Mesh& mesh) : rasteriser_{mesh} {}
   void render(const Eigen::Isometry3d& T_supply_object, DepthImage& image) override {
     rasteriser_.draw(T_supply_object.linear().cast<float>(), T_supply_object.translation().cast<float>(),
-                     image.pixel_mm, image.origin_mm, drawn_, false);
+                     image.pixel_mm, image.origin_mm, drawn_);
     image.z_mm.setConstant(kNothing);
     for (int r = std::max(0, -drawn_.row0); r < drawn_.rows && r + drawn_.row0 < image.z_mm.rows(); ++r)
       for (int c = std::max(0, -drawn_.col0); c < drawn_.cols && c + drawn_.col0 < image.z_mm.cols(); ++c)
@@ -79,7 +79,7 @@ Rasteriser::Rasteriser(const Mesh& mesh) : outward_{turns_outward(mesh)} {
 }
 
 void Rasteriser::draw(const Eigen::Matrix3f& R, const Eigen::Vector3f& t, double pixel_mm,
-                      const Eigen::Vector2d& origin_mm, Template& out, bool bottoms) const {
+                      const Eigen::Vector2d& origin_mm, Template& out) const {
   out.rows = out.cols = out.stride = 0;
   const auto per_mm = static_cast<float>(1 / pixel_mm);
   // Vertices in pixels of the depth image; z stays in millimetres.
@@ -108,7 +108,6 @@ void Rasteriser::draw(const Eigen::Matrix3f& R, const Eigen::Vector3f& t, double
   const std::size_t pixels =
       static_cast<std::size_t>(out.rows + 2 * Template::kMarginPx) * static_cast<std::size_t>(out.stride);
   out.top_mm.assign(pixels, -std::numeric_limits<float>::infinity());
-  if (bottoms || !outward_) out.bottom_mm.assign(pixels, std::numeric_limits<float>::infinity());
   out.triangle.assign(pixels, -1);
 
   for (std::size_t i = 0; i < points_; ++i) {
@@ -116,20 +115,9 @@ void Rasteriser::draw(const Eigen::Matrix3f& R, const Eigen::Vector3f& t, double
     at[points_ + i] -= static_cast<float>(out.row0);
   }
   const std::size_t first = out.at(0, 0);
-  const kernels::Canvas canvas{out.top_mm.data() + first,
-                               out.bottom_mm.data() + first,
-                               out.triangle.data() + first,
-                               out.rows,
-                               out.cols,
-                               out.stride};
-  kernels::table().draw(canvas, at.data(), points_, triangles_.data(), triangles_.size() / 3,
-                        !outward_ ? kernels::Faces::Both
-                        : bottoms ? kernels::Faces::ByOrientation
-                                  : kernels::Faces::Top);
+  const kernels::Canvas canvas{out.top_mm.data() + first, out.triangle.data() + first, out.rows, out.cols, out.stride};
+  kernels::table().draw(canvas, at.data(), points_, triangles_.data(), triangles_.size() / 3, outward_);
   for (std::size_t i = 0; i < pixels; ++i) out.top_mm[i] = out.triangle[i] < 0 ? kNothing : out.top_mm[i];
-  if (!bottoms) return;
-  for (std::size_t i = 0; i < pixels; ++i)  // a knife's edge may be seen from above only
-    out.bottom_mm[i] = out.triangle[i] < 0 ? kNothing : std::min(out.bottom_mm[i], out.top_mm[i]);
 }
 
 std::unique_ptr<DepthRenderer> make_working_renderer(const Mesh& mesh) {

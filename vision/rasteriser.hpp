@@ -18,7 +18,6 @@ struct Template {
   int rows = 0, cols = 0;
   int stride = 0;                      ///< From row to row.
   std::vector<float> top_mm;           ///< Highest surface, NaN outside the silhouette.
-  std::vector<float> bottom_mm;        ///< Lowest surface.
   std::vector<std::int32_t> triangle;  ///< Of the highest surface; -1 outside.
 
   std::size_t at(int row, int col) const {
@@ -35,9 +34,8 @@ class Rasteriser {
  public:
   explicit Rasteriser(const Mesh& mesh);
   /// Draws the mesh at R, t (supply from object, mm) on the grid given by pixel size and the centre of pixel (0, 0).
-  /// Without `bottoms` the lowest surface is left out where that saves time; bottom_mm is undefined then.
   void draw(const Eigen::Matrix3f& R, const Eigen::Vector3f& t, double pixel_mm, const Eigen::Vector2d& origin_mm,
-            Template& out, bool bottoms = true) const;
+            Template& out) const;
   /// Unit normal of a triangle, object frame.
   Eigen::Vector3f normal(std::int32_t triangle) const {
     const float* n = normals_.data() + triangle;

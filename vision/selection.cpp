@@ -11,7 +11,6 @@
 namespace binpick::vision {
 namespace {
 constexpr double kClaimedMax = 0.5;
-constexpr double kInsideMax = 0.12;
 constexpr double kOnePlaceDiameters = 0.06;
 constexpr const char* kExplained = "explained by a better one";
 /// A rival has to speak of mostly the same pixels.
@@ -38,33 +37,11 @@ std::string what_speaks_against(const DenseTest& test) {
   return "too little evidence";
 }
 
-/// Columns in which both bodies claim the same room.
-int shared_columns(const Template& a, const Template& b, float depth_mm) {
-  const int row_first = std::max(a.row0, b.row0), row_last = std::min(a.row0 + a.rows, b.row0 + b.rows);
-  const int col_first = std::max(a.col0, b.col0), col_last = std::min(a.col0 + a.cols, b.col0 + b.cols);
-  if (row_first >= row_last || col_first >= col_last) return 0;
-  int shared = 0;
-  for (int r = row_first; r < row_last; ++r)
-    for (int c = col_first; c < col_last; ++c) {
-      const std::size_t i = a.at(r - a.row0, c - a.col0), j = b.at(r - b.row0, c - b.col0);
-      if (a.triangle[i] < 0 || b.triangle[j] < 0) continue;
-      shared += std::min(a.top_mm[i], b.top_mm[j]) - std::max(a.bottom_mm[i], b.bottom_mm[j]) > depth_mm;
-    }
-  return shared;
-}
-
 /// A candidate on the picture.
 struct Shown {
   Template drawn;
   std::vector<PixelState> states;  ///< Empty: not drawn yet.
-  std::ptrdiff_t columns = 0;      ///< Pixels of the silhouette.
 };
-
-/// Columns in which both bodies claim the same room, over the columns of the smaller.
-double shared_room(const Shown& a, const Shown& b, float depth_mm) {
-  const auto smaller = std::max<std::ptrdiff_t>(1, std::min(a.columns, b.columns));
-  return static_cast<double>(shared_columns(a.drawn, b.drawn, depth_mm)) / static_cast<double>(smaller);
-}
 
 class Selecting {
  public:
@@ -115,10 +92,8 @@ class Selecting {
 
   void show(std::size_t i) {
     const Pose& pose = candidates_[i].pose;
-    part_.draw(pose.R, pose.t, scene_.pixel_mm, scene_.origin_mm, shown_[i].drawn, options_.rooms);
+    part_.draw(pose.R, pose.t, scene_.pixel_mm, scene_.origin_mm, shown_[i].drawn);
     compare(scene_, part_, pose, shown_[i].drawn, shown_[i].states);
-    const std::vector<std::int32_t>& triangles = shown_[i].drawn.triangle;
-    shown_[i].columns = std::count_if(triangles.begin(), triangles.end(), [](std::int32_t k) { return k >= 0; });
   }
 
   /// Those that will most likely be asked for, by all threads; the others are drawn when they are.
@@ -206,13 +181,9 @@ class Selecting {
       ++claimed;
       ++claims[static_cast<std::size_t>(owner)];
     });
-    const auto room_mm = static_cast<float>(2 * tolerance_of(scene_) + 0.01 * options_.diameter_mm);
     for (std::size_t s = 0; s < standing_.size(); ++s) {
       const float share = static_cast<float>(claims[s]) / static_cast<float>(std::max(1, explained));
       if (share > kRivalShare) add_rival(standing_[s], entry);
-      if (options_.rooms && entry.reason.empty() && share <= kClaimedMax &&
-          shared_room(shown_[standing_[s].candidate], shown_[i], room_mm) > kInsideMax)
-        entry.reason = "stands inside a better one";
     }
     Evidence& evidence = entry.candidate.evidence;
     evidence[Clue::Claimed] = static_cast<float>(claimed) / static_cast<float>(std::max(1, explained));

@@ -30,7 +30,6 @@ struct SelectOptions {
   double score_min = 0.1;
   Grid<std::uint8_t> content;  ///< As large as the scene: 1 where something lies (Bounds::content()), else 0.
   std::function<std::string(const Pose&)> outside;  ///< Why the part cannot be there at all; empty: it can.
-  bool rooms = true;                                ///< Two bodies do not share room.
   bool explain_away = true;                         ///< A pixel is explained once.
   bool ask_known = true;  ///< What is known of the supply counts: not where only a part of it was looked at.
 };
@@ -43,8 +42,8 @@ struct Selected {
 };
 
 /// Goes through the candidates by evidence: the first stands; what shows the same object again is dropped, what lives
-/// on pixels that a better one explains already, or stands inside of it, is rejected with that reason, and so is what
-/// is not believed by itself. Best first.
+/// on pixels that a better one explains already is rejected with that reason, and so is what is not believed by
+/// itself. Best first.
 std::vector<Selected> select(const Scene& scene, const Rasteriser& part, const Symmetry& symmetry,
                              std::vector<Candidate> candidates, const SelectOptions& options);
 

@@ -129,7 +129,7 @@ int glance_every(const Scene& scene, double diameter_mm) {
 
 float glance(const Scene& scene, const Rasteriser& part, const Pose& pose, Template& drawn, int every,
              const kernels::Table& loops) {
-  part.draw(pose.R, pose.t, every * scene.pixel_mm, scene.origin_mm, drawn, false);
+  part.draw(pose.R, pose.t, every * scene.pixel_mm, scene.origin_mm, drawn);
   if (every == 1) return dense_test(scene, part, pose, drawn, loops).evidence;
   if (drawn.rows == 0) return 0;
   kernels::DenseSum sum;

@@ -54,6 +54,26 @@ TEST(Detector, OneObjectInManyPoses) {
   }
 }
 
+// A view's first anchor is its highest place. Votes point at it; where it was not measured, another one has to serve.
+TEST(Detector, VotesFindWhatDoesNotShowItsHighestPlace) {
+  constexpr int kPoses = 12, kHidden = 11;
+  int found = 0, by_the_first_anchor_alone = 0;
+  for (int k = 0; k < kPoses; ++k) {
+    const Eigen::Isometry3d truth = pose(-60 + 10 * k, 30, 120, 0.9 * k, 0.25 * k);
+    DepthImage image = scenes::image_of(bracket_base().mesh(), {truth}, static_cast<std::uint32_t>(k));
+    Eigen::Index row = 0, col = 0;
+    image.z_mm.isNaN().select(-1e9F, image.z_mm).maxCoeff(&row, &col);
+    image.z_mm.block(row - kHidden, col - kHidden, 2 * kHidden + 1, 2 * kHidden + 1).setConstant(kNan);
+    DetectorOptions options = scenes::options();
+    options.search = Search::Votes;
+    found += error_of(detect(image, kSupply, bracket_base(), options), truth).mm < 3;
+    options.without = {"all anchors"};
+    by_the_first_anchor_alone += error_of(detect(image, kSupply, bracket_base(), options), truth).mm < 3;
+  }
+  EXPECT_EQ(found, kPoses);
+  EXPECT_LT(by_the_first_anchor_alone, found);
+}
+
 TEST(Detector, SeveralObjectsEachOnce) {
   const std::vector<Eigen::Isometry3d> truth{pose(-180, -120, 0, 0.3), pose(-180, 110, 45, 1.0, std::numbers::pi / 2),
                                              pose(30, 0, 0, 2.2), pose(180, 130, 0, -0.7),
