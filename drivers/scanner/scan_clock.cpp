@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <vector>
 
 namespace binpick::drivers::scanner {
 namespace {
@@ -23,35 +22,11 @@ void ScanClock::restart(Duration nominal_period) {
   arrivals_.clear();
 }
 
-/// Height at `scan` of the line under all arrivals that is nearest to them on average: the edge of their lower convex
-/// hull below their mean.
-double ScanClock::line_at(std::int64_t scan) const {
-  const double span_s = static_cast<double>(arrivals_.back().scan - arrivals_.front().scan) * period_s_;
-  const auto lowest_with = [&](double slope) {
-    double lowest = arrivals_.front().late_s - slope * static_cast<double>(arrivals_.front().scan - scan);
-    for (const Arrival& a : arrivals_) lowest = std::min(lowest, a.late_s - slope * static_cast<double>(a.scan - scan));
-    return lowest;
-  };
-  if (span_s < kSlopeSpan_s) return lowest_with(0);
-
-  std::vector<Arrival> hull;
-  double mean_scan = 0;
-  for (const Arrival& a : arrivals_) {
-    mean_scan += static_cast<double>(a.scan);
-    const auto turns_down = [&] {
-      const Arrival &p = hull[hull.size() - 2], &q = hull.back();
-      return (q.late_s - p.late_s) * static_cast<double>(a.scan - p.scan) >=
-             (a.late_s - p.late_s) * static_cast<double>(q.scan - p.scan);
-    };
-    while (hull.size() >= 2 && turns_down()) hull.pop_back();
-    hull.push_back(a);
-  }
-  mean_scan /= static_cast<double>(arrivals_.size());
-  std::size_t right = 1;
-  while (right + 1 < hull.size() && static_cast<double>(hull[right].scan) < mean_scan) ++right;
-  const Arrival &p = hull[right - 1], &q = hull[right];
-  const double slope = (q.late_s - p.late_s) / static_cast<double>(q.scan - p.scan);
-  return lowest_with(std::clamp(slope, -kSlopeMax * period_s_, kSlopeMax * period_s_));
+/// Height of the line of the last scans at the newest one.
+double ScanClock::lateness() const {
+  const double newest_s = arrivals_.back().at_s;
+  const bool is_short = newest_s - arrivals_.front().at_s < kSlopeSpan_s;
+  return (is_short ? line_under_with(arrivals_, 0) : line_under(arrivals_, kSlopeMax)).at(newest_s);
 }
 
 ScanClock::Reading ScanClock::on_scan(std::uint16_t counter, TimePoint received_at) {
@@ -78,10 +53,9 @@ ScanClock::Reading ScanClock::on_scan(std::uint16_t counter, TimePoint received_
     scan_ += step;
   }
   const double nominal_s = static_cast<double>(scan_) * period_s_;
-  arrivals_.push_back({scan_, in_s(received_at - origin_) - nominal_s});
-  while (arrivals_.size() > kArrivalsMax || static_cast<double>(scan_ - arrivals_.front().scan) * period_s_ > kWindow_s)
-    arrivals_.pop_front();
-  reading.measured_at = std::min(received_at, origin_ + from_s(nominal_s + line_at(scan_)));
+  arrivals_.push_back({nominal_s, in_s(received_at - origin_) - nominal_s});
+  while (arrivals_.size() > kArrivalsMax || nominal_s - arrivals_.front().at_s > kWindow_s) arrivals_.pop_front();
+  reading.measured_at = std::min(received_at, origin_ + from_s(nominal_s + lateness()));
   return reading;
 }
 }  // namespace binpick::drivers::scanner

@@ -4,6 +4,7 @@
 #include <deque>
 
 #include "base/clock.hpp"
+#include "base/lower_line.hpp"
 
 namespace binpick::drivers::scanner {
 /// When each scan was measured, from when its telegram arrived and from the scan counter. The device gives no time.
@@ -28,16 +29,12 @@ class ScanClock {
   Reading on_scan(std::uint16_t counter, TimePoint received_at);
 
  private:
-  struct Arrival {
-    std::int64_t scan;
-    double late_s;  ///< Against origin + scan · period.
-  };
-  double line_at(std::int64_t scan) const;
+  double lateness() const;
 
   double period_s_ = 0;
   TimePoint origin_, last_received_at_;
   std::int64_t scan_ = -1;  ///< Of the newest arrival; -1: none yet.
   std::uint16_t counter_ = 0;
-  std::deque<Arrival> arrivals_;
+  std::deque<Arrival> arrivals_;  ///< By the time that the counter says, at the nominal period.
 };
 }  // namespace binpick::drivers::scanner
