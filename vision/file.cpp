@@ -93,6 +93,12 @@ Expected<void, std::string> write_file(const std::string& path, std::span<const 
     if (::fsync(file.fd) != 0) return failed();
   }
   if (std::rename(beside.c_str(), path.c_str()) != 0) return failed();
+  // The new name lasts through a power cut only when the folder has been written too. Some network file systems know no
+  // such call on a folder: theirs is the server's matter.
+  const auto slash = path.rfind('/');
+  const std::string folder = slash == std::string::npos ? "." : path.substr(0, slash + 1);
+  const Descriptor names{::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
+  if (names.fd >= 0 && ::fsync(names.fd) != 0 && errno == EIO) return failed();
   return {};
 }
 }  // namespace binpick::vision

@@ -21,6 +21,7 @@ FileBytes kept(std::vector<std::byte> bytes);
 /// The file must be replaced by renaming, as write_file() does, not written over, while it is mapped.
 Expected<FileBytes, std::string> map_file(const std::string& path);
 
-/// Written beside `path` under another name first and then renamed: a reader sees the old file or the whole new one.
+/// Written beside `path` under another name first and then renamed: a reader sees the old file or the whole new one. It
+/// is on the disk when this returns; a power cut before leaves the old file.
 Expected<void, std::string> write_file(const std::string& path, std::span<const std::byte> bytes);
 }  // namespace binpick::vision
