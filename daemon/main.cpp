@@ -42,7 +42,7 @@ class Watchdog {
   }
   std::optional<TimePoint> deadline() const { return period_.count() > 0 ? std::optional{next_} : std::nullopt; }
   void turn(const VisionWorker& worker, Duration detection_deadline, TimePoint now) {
-    const bool alive = progress_.alive(worker.progress(), worker.busy(), detection_deadline, now);
+    const bool alive = progress_.alive(worker.progress(), detection_deadline, now);
     if (period_.count() == 0 || now < next_) return;
     next_ = now + period_;
     if (alive) sd_notify(0, "WATCHDOG=1");

@@ -10,17 +10,23 @@ constexpr TimePoint kStart{1h};
 
 TEST(ProgressWatch, ADetectionHasTheTimeThatTheConfigurationGrants) {
   ProgressWatch watch;
-  EXPECT_TRUE(watch.alive(1, true, 60s, kStart));
-  EXPECT_TRUE(watch.alive(1, true, 60s, kStart + 60s)) << "detection.deadline_ms = 60000 is allowed";
-  EXPECT_FALSE(watch.alive(1, true, 60s, kStart + 80s));
-  EXPECT_TRUE(watch.alive(2, true, 60s, kStart + 81s));
+  EXPECT_TRUE(watch.alive(1, 60s, kStart));
+  EXPECT_TRUE(watch.alive(1, 60s, kStart + 60s)) << "detection.deadline_ms = 60000 is allowed";
+  EXPECT_FALSE(watch.alive(1, 60s, kStart + 80s));
+  EXPECT_TRUE(watch.alive(2, 60s, kStart + 81s));
 }
 
-TEST(ProgressWatch, AnIdleWorkerIsAlive) {
+TEST(ProgressWatch, AnIdleWorkerCountsUpOrHangs) {
   ProgressWatch watch;
-  EXPECT_TRUE(watch.alive(1, false, 3s, kStart));
-  EXPECT_TRUE(watch.alive(1, false, 3s, kStart + 1h));
-  EXPECT_TRUE(watch.alive(1, true, 3s, kStart + 1h));
-  EXPECT_FALSE(watch.alive(1, true, 3s, kStart + 1h + 20s)) << "as ever with the default deadline";
+  for (int half_second = 0; half_second < 1000; ++half_second)
+    EXPECT_TRUE(watch.alive(static_cast<std::uint64_t>(half_second), 3s, kStart + half_second * 500ms));
+  EXPECT_TRUE(watch.alive(999, 3s, kStart + 500s + 19s));
+  EXPECT_FALSE(watch.alive(999, 3s, kStart + 500s + 20s));
+}
+
+TEST(ProgressWatch, AWorkerThatNeverBeganHangs) {
+  ProgressWatch watch;
+  EXPECT_TRUE(watch.alive(0, 3s, kStart));
+  EXPECT_FALSE(watch.alive(0, 3s, kStart + 20s));
 }
 }  // namespace binpick::daemon
