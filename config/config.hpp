@@ -10,7 +10,7 @@
 #include "base/frames.hpp"
 #include "drivers/pivot/session.hpp"
 #include "drivers/robot/session.hpp"
-#include "drivers/scanner/lms400/session.hpp"
+#include "drivers/scanner/any/scanner.hpp"
 #include "plc/session.hpp"
 #include "vision/detector.hpp"
 #include "vision/grasp.hpp"
@@ -54,6 +54,8 @@ struct Detection {
   vision::Search search = vision::Search::Exhaustive;
 };
 
+enum class ScannerModel { Lms400, Lps36, Lps36Hi };
+
 struct Config {
   std::string path;
   std::string name;
@@ -62,10 +64,15 @@ struct Config {
   std::string pivot_can;                    ///< "can0" or "cannelloni://HOST:PORT".
   std::uint16_t pivot_can_listen_port = 0;  ///< Local UDP port for cannelloni, 0: any.
   drivers::pivot::Options pivot;
-  Duration pivot_latency{0};    ///< Added to the time of each position sample.
-  std::string scanner_address;  ///< "host:port".
-  drivers::lms400::Options scanner;
-  Duration scanner_latency{0};  ///< Measured this much before the smoothed receive time.
+  Duration pivot_latency{0};                 ///< Added to the time of each position sample.
+  std::string scanner_address;               ///< "host:port".
+  std::uint16_t scanner_listen_port = 5634;  ///< Own UDP port for an LPS 36, 0: any.
+  ScannerModel scanner_model = ScannerModel::Lms400;
+  drivers::lms400::Options lms400;  ///< Its profile_timeout is that of any model.
+  drivers::lps36::Options lps36;
+  std::optional<int> manual_exposure_us;
+  drivers::scanner::Options scanner_options() const;  ///< Of the model that is configured.
+  Duration scanner_latency{0};                        ///< Measured this much before the smoothed receive time.
   vision::ScannerMount mount;
   std::string robot_listen;
   std::vector<std::string> robot_allow;

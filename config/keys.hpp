@@ -35,10 +35,12 @@ struct KeyFacts {
   Type type = Type::Text;
   const char* unit = "";                ///< "mm", "deg" …, empty: none.
   double min = 0, max = 0;              ///< Of numbers and of each number in a vector.
+  const char* only_for = "";            ///< "scanner.model = lps36, lps36hi": elsewhere the key is a mistake.
+  bool in_example = false;              ///< With `only_for`: the example file is of that kind.
   const char* default_value = nullptr;  ///< Absent: required, or (optional) derived, as `help` says.
-  bool required = false;
-  const char* example = nullptr;  ///< In the example file; absent: the default.
-  const char* sample = nullptr;   ///< Of a key whose default is derived: stands in the example file as a comment.
+  bool required = false;                ///< With `only_for`: there only.
+  const char* example = nullptr;        ///< In the example file; absent: the default.
+  const char* sample = nullptr;         ///< Of a key whose default is derived: stands in the example file as a comment.
   Change change = Change::NextCycle;
   std::vector<const char*> choices = {};
   const char* help = "";

@@ -161,6 +161,7 @@ CellPlaces read_cell(const Document& document, Config& config, std::vector<std::
                      Findings& findings) {
   const ReadContext context{findings, document.damaged_keys};
   CellPlaces places;
+  places.damaged_keys = document.damaged_keys;
   const Value empty{};
   for (const auto& section : cell_sections()) {
     const Member* member = document.root.find(section.name);
@@ -172,7 +173,8 @@ CellPlaces read_cell(const Document& document, Config& config, std::vector<std::
     std::string required;
     for (const auto& key : section.keys) {
       set_default(key.facts, key.slot(config));
-      if (key.facts.required) required += (required.empty() ? "" : ", ") + std::string{key.facts.name};
+      if (key.facts.required && *key.facts.only_for == '\0')
+        required += (required.empty() ? "" : ", ") + std::string{key.facts.name};
     }
     if (member == nullptr && !required.empty())
       findings.add(end_of(document),
@@ -253,6 +255,15 @@ Expected<Config, std::vector<Diagnostic>> load_text(const std::string& path, std
 }
 Expected<Part, std::vector<Diagnostic>> load_part_text(const std::string& path, std::string_view text) {
   return load_part_document(parse(path, text));
+}
+
+drivers::scanner::Options Config::scanner_options() const {
+  if (scanner_model == ScannerModel::Lms400) return lms400;
+  drivers::lps36::Options options = lps36;
+  options.hi = scanner_model == ScannerModel::Lps36Hi;
+  options.profile_timeout = lms400.profile_timeout;
+  if (manual_exposure_us) options.manual_exposure = std::chrono::microseconds(*manual_exposure_us);
+  return options;
 }
 
 std::vector<std::string> needs_restart(const Config& running, const Config& edited) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,7 @@ namespace binpick::config {
 struct Places {
   Place header;
   std::map<std::string, Place, std::less<>> values;  ///< Only keys that stand in the file and were good.
+  std::set<std::string, std::less<>> bad;            ///< That stand in the file and were not.
 
   bool given(std::string_view key) const { return values.find(key) != values.end(); }
   const Place& of(std::string_view key) const {
@@ -62,10 +64,12 @@ Places read_section(const Value& table, const Section<Target>& section, Target& 
     set_default(key.facts, slot);
     const Member* member = table.find(key.facts.name);
     if (member == nullptr) {
-      if (key.facts.required && !context.damaged_keys.contains(key.facts.name))
+      if (key.facts.required && *key.facts.only_for == '\0' && !context.damaged_keys.contains(key.facts.name))
         report_missing(key.facts, prefix + key.facts.name, where, table.place, context.findings);
     } else if (read_value(member->value, key.facts, prefix + key.facts.name, slot, context.findings)) {
       places.values.emplace(key.facts.name, member->value.place);
+    } else {
+      places.bad.emplace(key.facts.name);
     }
   }
   return places;

@@ -1,6 +1,8 @@
 #include "config/rules.hpp"
 
 #include <cmath>
+#include <numbers>
+#include <optional>
 
 #include "config/wording.hpp"
 
@@ -15,14 +17,46 @@ std::string ms(std::chrono::milliseconds d) { return std::to_string(d.count()); 
 
 std::string port_of(const std::string& endpoint) { return endpoint.substr(endpoint.rfind(':') + 1); }
 
+/// Whether "scanner.model = lps36, lps36hi" holds; nothing where scanner.model itself is bad or missing.
+std::optional<bool> holds(const std::string& condition, Config& config, const CellPlaces& at) {
+  const std::size_t dot = condition.find('.'), equals = condition.find(" = ");
+  const std::string section = condition.substr(0, dot), name = condition.substr(dot + 1, equals - dot - 1);
+  for (const auto& candidate : cell_sections())
+    for (const auto& key : candidate.keys)
+      if (section == candidate.name && name == key.facts.name) {
+        if (key.facts.required && !at.given(section, name)) return std::nullopt;
+        const std::string value = key.facts.choices[std::get<Chosen>(key.slot(config)).get()];
+        return (", " + condition.substr(equals + 3) + ",").find(", " + value + ",") != std::string::npos;
+      }
+  return std::nullopt;
+}
+
+/// Keys that are for one kind of device only.
+template <class Target>
+void check_only_for(const Section<Target>& section, const std::string& where, const Places& places, Config config,
+                    const CellPlaces& at, Findings& findings) {
+  for (const auto& key : section.keys) {
+    if (*key.facts.only_for == '\0') continue;
+    const auto is_for_us = holds(key.facts.only_for, config, at);
+    const std::string name = std::string{section.name} + "." + key.facts.name;
+    if (!is_for_us) continue;
+    if (!*is_for_us && places.given(key.facts.name))
+      findings.add(places.of(key.facts.name), name + " is for " + key.facts.only_for + " only; remove it");
+    if (*is_for_us && key.facts.required && !places.given(key.facts.name) && !places.bad.contains(key.facts.name) &&
+        !at.damaged_keys.contains(key.facts.name))
+      report_missing(key.facts, name, where, places.header, findings);
+  }
+}
+
 void check_devices(const Config& c, const CellPlaces& at, Findings& findings) {
-  const double end_deg = c.scanner.start.in_deg() + c.scanner.range.in_deg();
-  if (end_deg > kFieldOfViewEndDeg + 1e-9) {
+  const bool is_sick = c.scanner_model == ScannerModel::Lms400;
+  const double end_deg = c.lms400.start.in_deg() + c.lms400.range.in_deg();
+  if (is_sick && end_deg > kFieldOfViewEndDeg + 1e-9) {
     const bool range_given = at.given("scanner", "range_deg");
     findings.add(at.of("scanner", range_given ? "range_deg" : "start_deg"),
                  "scanner.start_deg + scanner.range_deg = " + rounded(end_deg) +
                      " is beyond the field of view, 55 … 125; use range_deg = " +
-                     rounded(kFieldOfViewEndDeg - c.scanner.start.in_deg()) + " at most");
+                     rounded(kFieldOfViewEndDeg - c.lms400.start.in_deg()) + " at most");
   }
   if (c.pivot.setpoint_horizon < 2 * c.pivot.sample_period) {
     const bool horizon_given = at.given("pivot", "setpoint_horizon_ms");
@@ -31,6 +65,16 @@ void check_devices(const Config& c, const CellPlaces& at, Findings& findings) {
                      " is less than two sample periods of " + ms(c.pivot.sample_period) +
                      " ms, the pivot would halt between set-points; use at least " + ms(2 * c.pivot.sample_period));
   }
+  if (!is_sick && c.manual_exposure_us && c.lps36.exposure != drivers::lps36::Exposure::Manual)
+    findings.add(at.of("scanner", "manual_exposure_us"),
+                 "scanner.manual_exposure_us has no effect; write exposure = \"manual\", or remove it");
+  if (!is_sick && !c.manual_exposure_us && c.lps36.exposure == drivers::lps36::Exposure::Manual)
+    findings.add(at.of("scanner", "exposure"),
+                 "scanner.exposure = \"manual\" needs the time; add, for example: manual_exposure_us = 300");
+  if (c.scanner_model == ScannerModel::Lps36 && c.manual_exposure_us && *c.manual_exposure_us < 98)
+    findings.add(at.of("scanner", "manual_exposure_us"),
+                 "scanner.manual_exposure_us = " + std::to_string(*c.manual_exposure_us) +
+                     " is less than an LPS 36 can; use 98 … 1310");
   if (c.pivot_can_listen_port != 0 && at.given("pivot", "can") && !c.pivot_can.starts_with("cannelloni://"))
     findings.add(at.of("pivot", "can_listen_port"),
                  "pivot.can_listen_port is for cannelloni, but pivot.can is a network interface; remove it");
@@ -55,6 +99,8 @@ void check_servers(const Config& c, const CellPlaces& at, Findings& findings) {
 }
 
 void check_sweeps(const Config& c, const CellPlaces& at, Findings& findings) {
+  constexpr double kLeuzeFrequency_hz = 100;
+  const double profiles_per_s = c.scanner_model == ScannerModel::Lms400 ? c.lms400.frequency_hz : kLeuzeFrequency_hz;
   for (std::size_t i = 0; i < c.supplies.size(); ++i) {
     const Supply& supply = c.supplies[i];
     const Places& places = at.supplies[i];
@@ -73,8 +119,8 @@ void check_sweeps(const Config& c, const CellPlaces& at, Findings& findings) {
       findings.add(place, "supply: the sweep takes " + rounded(duration_s) +
                               " s, not less than plc.scan_timeout_ms = " + ms(c.plc.scan_timeout) +
                               "; sweep faster, or use a longer time-out");
-    } else if (duration_s * c.scanner.frequency_hz < kProfilesMin) {
-      findings.add(place, "supply: the sweep gives " + rounded(std::floor(duration_s * c.scanner.frequency_hz)) +
+    } else if (duration_s * profiles_per_s < kProfilesMin) {
+      findings.add(place, "supply: the sweep gives " + rounded(std::floor(duration_s * profiles_per_s)) +
                               " profiles; sweep slower or farther, " + rounded(kProfilesMin) + " are the least");
     }
   }
@@ -90,7 +136,9 @@ void check_views(const Config& c, const CellPlaces& at, Findings& findings) {
     const auto given = [&](const char* key) { return places.given(key); };
     if (!given("T_base_supply") || !given("size_mm") || !given("sweep_start_deg") || !given("sweep_end_deg")) continue;
     const double pivot_rad = (supply.sweep_start.in_rad() + supply.sweep_end.in_rad()) / 2;
-    const double ray_rad = c.scanner.start.in_rad() + c.scanner.range.in_rad() / 2;
+    const double ray_rad = c.scanner_model == ScannerModel::Lms400
+                               ? c.lms400.start.in_rad() + c.lms400.range.in_rad() / 2
+                               : std::numbers::pi / 2;
     const Eigen::Isometry3d T_supply_scanner = supply.T_base_supply.iso.inverse() * c.mount.T_base_pivot.iso *
                                                Eigen::AngleAxisd(pivot_rad, Eigen::Vector3d::UnitZ()) *
                                                c.mount.T_pivot_scanner.iso;
@@ -128,6 +176,11 @@ void check_ids(const std::vector<Entry>& entries, const std::vector<Places>& pla
 }  // namespace
 
 void check_rules(const Config& config, const CellPlaces& places, Findings& findings) {
+  for (const auto& section : cell_sections())
+    check_only_for(section, "[" + std::string{section.name} + "]", places.sections.at(section.name), config, places,
+                   findings);
+  for (const Places& supply : places.supplies)
+    check_only_for(supply_section(), "[[supply]]", supply, config, places, findings);
   check_devices(config, places, findings);
   check_servers(config, places, findings);
   check_sweeps(config, places, findings);

@@ -11,6 +11,7 @@ struct CellPlaces {
   std::map<std::string, Places, std::less<>> sections;
   std::vector<Places> supplies;
   std::vector<Places> parts;
+  std::set<std::string> damaged_keys;  ///< In lines that could not be read: not missing.
 
   const Place& of(const std::string& section, const std::string& key) const { return sections.at(section).of(key); }
   /// False where a key was given but bad, or its section is: then a rule about it would only echo that.

@@ -32,6 +32,7 @@ std::string figures(const KeyFacts& facts) {
   if (facts.type == Type::Integer || facts.type == Type::Number || facts.type == Type::Vector) add(range_text(facts));
   if (facts.type == Type::Choice) text = choices_text(facts);
   if (facts.required) add("required");
+  if (*facts.only_for != '\0') add("for " + std::string{facts.only_for} + " only");
   if (facts.default_value != nullptr) add("default " + std::string{facts.default_value});
   if (facts.change == Change::Restart) text += "; a change needs a restart";
   return text;
@@ -45,10 +46,15 @@ std::string example_of(const Section<Target>& section, bool repeated) {
     text += repeated ? "[[" + std::string{section.name} + "]]\n" : "[" + std::string{section.name} + "]\n";
   for (const auto& key : section.keys) {
     text += comment(std::string{key.facts.help} + " (" + figures(key.facts) + ")");
-    const bool live = key.facts.example != nullptr || key.facts.default_value != nullptr;
+    const bool live = (key.facts.example != nullptr || key.facts.default_value != nullptr) &&
+                      (*key.facts.only_for == '\0' || key.facts.in_example);
     text += std::string{live ? "" : "# "} + key.facts.name + " = " + example_text(key.facts) + "\n";
   }
   return text;
+}
+
+std::string only_for(const KeyFacts& facts) {
+  return *facts.only_for == '\0' ? "" : "(`" + std::string{facts.only_for} + "`) ";
 }
 
 std::string escaped(std::string text) {
@@ -68,7 +74,7 @@ std::string table_of(const Section<Target>& section, const std::string& title, c
                                  : f.default_value != nullptr ? "`" + std::string{f.default_value} + "`"
                                                               : "derived";
     text += "| `" + std::string{f.name} + "` | " + escaped(value) + " | " + fallback + " | " +
-            (f.change == Change::Restart ? "restart" : "next cycle") + " | " + escaped(f.help) + " |\n";
+            (f.change == Change::Restart ? "restart" : "next cycle") + " | " + only_for(f) + escaped(f.help) + " |\n";
   }
   return text + "\n";
 }

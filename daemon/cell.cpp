@@ -30,9 +30,10 @@ Cell::Cell(std::shared_ptr<const CellData> data, std::uint16_t boot_count)
       data_{std::move(data)},
       plc_{with_ids(data_->config), boot_count},
       pivot_{data_->config.pivot},
-      scanner_{data_->config.scanner},
+      scanner_{data_->config.scanner_options()},
       robot_{data_->config.robot},
-      sweep_{pivot_, scanner_} {
+      carrier_{pivot_},
+      sweep_{carrier_, scanner_} {
   robot_.withdraw(drivers::robot::NoPick::NotReady);
 }
 
@@ -148,7 +149,7 @@ void Cell::update_ready(TimePoint now) {
   const auto scanner = scanner_.state();
   if (pivot != drivers::pivot::Session::State::Standing && pivot != drivers::pivot::Session::State::Moving)
     reasons |= static_cast<unsigned>(NotReady::Pivot);
-  if (scanner != drivers::lms400::Session::State::Idle && scanner != drivers::lms400::Session::State::Measuring)
+  if (scanner != drivers::scanner::State::Idle && scanner != drivers::scanner::State::Measuring)
     reasons |= static_cast<unsigned>(NotReady::Scanner);
   if (!started_with_.robot_listen.empty() && !robot_.connected()) reasons |= static_cast<unsigned>(NotReady::Robot);
   if (stopping_) reasons |= static_cast<unsigned>(NotReady::Stopping);
@@ -186,15 +187,13 @@ void Cell::begin_sweep(TimePoint now) {
   const auto& part = data_->knowledge_bases[recipe_];
   const Eigen::Vector2d half = supply.size_mm.head<2>() / 2;
   builder_.emplace(part.pixel_mm(), -half, half);
-  drivers::sweep::Plan plan;
-  plan.start = supply.sweep_start;
-  plan.end = supply.sweep_end;
-  plan.speed_rad_s = supply.sweep_speed_rad_s;
-  plan.positioning_speed_rad_s =
-      std::max(plan.speed_rad_s, kPositioningShare * (module_ ? module_->velocity_max_rad_s : 0.0));
-  plan.pivot_latency = data_->config.pivot_latency;
-  plan.scanner_latency = data_->config.scanner_latency;
-  sweep_.begin(plan, now);
+  carrier_.set_latency(data_->config.pivot_latency);
+  const double positioning_speed_rad_s =
+      std::max(supply.sweep_speed_rad_s, kPositioningShare * (module_ ? module_->velocity_max_rad_s : 0.0));
+  sweep_.begin({.motion = drivers::sweep::PivotSweep{supply.sweep_start, supply.sweep_end, supply.sweep_speed_rad_s,
+                                                     positioning_speed_rad_s},
+                .scanner_latency = data_->config.scanner_latency},
+               now);
 }
 
 void Cell::start_detection(TimePoint now) {

@@ -12,7 +12,8 @@
 #include "daemon/sequence.hpp"
 #include "drivers/pivot/session.hpp"
 #include "drivers/robot/session.hpp"
-#include "drivers/scanner/lms400/session.hpp"
+#include "drivers/scanner/any/scanner.hpp"
+#include "drivers/sweep/pivot_carrier.hpp"
 #include "drivers/sweep/sweep.hpp"
 #include "plc/session.hpp"
 #include "vision/depth_image.hpp"
@@ -26,7 +27,7 @@ class Cell {
 
   plc::Session& plc() { return plc_; }
   drivers::pivot::Session& pivot() { return pivot_; }
-  drivers::lms400::Session& scanner() { return scanner_; }
+  drivers::scanner::Scanner& scanner() { return scanner_; }
   drivers::robot::Session& robot() { return robot_; }
 
   /// Serves deadlines that have come, drains every session's events and moves the cycle on, until nothing happens any
@@ -70,7 +71,7 @@ class Cell {
 
   void on(const plc::Event& event, TimePoint now);
   void on(const drivers::pivot::Event& event, TimePoint now);
-  void on(const drivers::lms400::Event& event, TimePoint now);
+  void on(const drivers::scanner::Event& event, TimePoint now);
   void on(const drivers::robot::Event& event, TimePoint now);
   void on(drivers::sweep::Event& event, TimePoint now);
 
@@ -79,8 +80,9 @@ class Cell {
   std::shared_ptr<const CellData> edited_;  // in force after the running cycle
   plc::Session plc_;
   drivers::pivot::Session pivot_;
-  drivers::lms400::Session scanner_;
+  drivers::scanner::Scanner scanner_;
   drivers::robot::Session robot_;
+  drivers::sweep::PivotCarrier carrier_;
   drivers::sweep::Sweep sweep_;
 
   CellState state_ = CellState::Idle;

@@ -30,8 +30,8 @@ plc::Alarm alarm_of(const drivers::pivot::Failed& failed) {
   return plc::Alarm::PivotModuleError;
 }
 
-plc::Alarm alarm_of(const drivers::lms400::Failed& failed) {
-  using Why = drivers::lms400::Failed::Why;
+plc::Alarm alarm_of(const drivers::scanner::Failed& failed) {
+  using Why = drivers::scanner::Failed::Why;
   switch (failed.why) {
     case Why::NoReply:
       return plc::Alarm::ScannerNoReply;
@@ -110,7 +110,7 @@ void Cell::on(const drivers::pivot::Event& event, TimePoint now) {
                 module_->position_max.in_deg(), Angle::rad(module_->velocity_max_rad_s).in_deg());
     alarm_off(pivot_alarm_, now);
   }
-  sweep_.on_pivot(event, now);
+  if (const auto news = carrier_.on(event)) sweep_.on_carrier(*news, now);
   if (const auto* failed = std::get_if<drivers::pivot::Failed>(&event)) {
     if (pivot_alarm_ && *pivot_alarm_ != alarm_of(*failed)) alarm_off(pivot_alarm_, now);
     pivot_alarm_ = alarm_of(*failed);
@@ -118,13 +118,13 @@ void Cell::on(const drivers::pivot::Event& event, TimePoint now) {
   }
 }
 
-void Cell::on(const drivers::lms400::Event& event, TimePoint now) {
-  if (const auto* ready = std::get_if<drivers::lms400::Ready>(&event)) {
-    BINPICK_LOG(Notice, "scanner", "ready: %.0f Hz, %.3f deg", ready->frequency_hz, ready->resolution.in_deg());
+void Cell::on(const drivers::scanner::Event& event, TimePoint now) {
+  if (const auto* ready = std::get_if<drivers::scanner::Ready>(&event)) {
+    BINPICK_LOG(Notice, "scanner", "ready: %s", drivers::scanner::in_words(*ready).c_str());
     alarm_off(scanner_alarm_, now);
   }
   sweep_.on_scanner(event, now);
-  if (const auto* failed = std::get_if<drivers::lms400::Failed>(&event)) {
+  if (const auto* failed = std::get_if<drivers::scanner::Failed>(&event)) {
     if (scanner_alarm_ && *scanner_alarm_ != alarm_of(*failed)) alarm_off(scanner_alarm_, now);
     scanner_alarm_ = alarm_of(*failed);
     device_failed(*scanner_alarm_, "scanner: " + failed->text, now);
@@ -161,11 +161,11 @@ void Cell::on(drivers::sweep::Event& event, TimePoint now) {
           [&](const drivers::sweep::RegisteredProfile& registered) {
             if (state_ != CellState::Sweeping) return;
             const auto& config = data_->config;
-            const auto T_base_scanner = vision::scanner_at(config.mount, registered.pivot);
+            const auto T_base_scanner = vision::scanner_at(config.mount, std::get<Angle>(registered.carrier));
             const auto T_supply_scanner = config.supplies[supply_].T_base_supply.inverse() * T_base_scanner;
             points_supply_mm_.clear();
-            vision::register_profile(registered.profile.range_mm, registered.profile.first, registered.profile.step,
-                                     T_supply_scanner, points_supply_mm_);
+            vision::register_profile(registered.profile.x_mm, registered.profile.z_mm, T_supply_scanner,
+                                     points_supply_mm_);
             builder_->add(points_supply_mm_);
           },
           [&](const drivers::sweep::Done& done) {
@@ -181,7 +181,7 @@ void Cell::on(drivers::sweep::Event& event, TimePoint now) {
           },
           [&](const drivers::sweep::Failed& failed) {
             using Device = drivers::sweep::Failed::Device;
-            cycle_alarm_ = failed.device == Device::Pivot     ? pivot_alarm_.value_or(plc::Alarm::PivotModuleError)
+            cycle_alarm_ = failed.device == Device::Carrier   ? pivot_alarm_.value_or(plc::Alarm::PivotModuleError)
                            : failed.device == Device::Scanner ? scanner_alarm_.value_or(plc::Alarm::ScannerNoReply)
                                                               : plc::Alarm::ScanTimeout;
             BINPICK_LOG(Warning, "cell", "cycle %llu: sweep failed: %s", static_cast<unsigned long long>(cycle_id_),

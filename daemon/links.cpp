@@ -4,6 +4,7 @@
 
 #include "base/log.hpp"
 #include "base/peer_address.hpp"
+#include "drivers/scanner/any/scanner_link.hpp"
 
 namespace binpick::daemon {
 namespace link = drivers::link;
@@ -39,22 +40,14 @@ std::unique_ptr<link::CanLink> open_pivot(link::Loop& loop, Cell& cell) {
       },
       config.pivot_can_listen_port);
 }
-
-link::StreamPeer scanner_peer(Cell& cell) {
-  return {
-      .on_connected = [&cell](TimePoint now) { cell.scanner().on_connected(now); },
-      .on_bytes = [&cell](ByteView bytes, TimePoint now) { cell.scanner().on_bytes(bytes, now); },
-      .on_disconnected = [&cell](TimePoint now) { cell.scanner().on_disconnected(now); },
-      .take_output = [&cell] { return cell.scanner().take_output(); },
-  };
-}
 }  // namespace
 
 Links::Links(link::Loop& loop, Cell& cell)
     : cell_{cell},
       plc_{loop, endpoint(cell.data().config.plc_listen, "plc.listen"), plc_peer(cell)},
       pivot_{open_pivot(loop, cell)},
-      scanner_{loop, endpoint(cell.data().config.scanner_address, "scanner.address"), scanner_peer(cell)} {
+      scanner_{drivers::scanner::open_link(loop, cell.data().config.scanner_address,
+                                           cell.data().config.scanner_listen_port, cell.scanner())} {
   if (cell.data().config.robot_listen.empty()) return;  // the PLC forwards the movement
   robot_.emplace(
       loop, endpoint(cell.data().config.robot_listen, "robot.listen"),
@@ -91,16 +84,16 @@ Links::Links(link::Loop& loop, Cell& cell)
 void Links::on_deadline(TimePoint now) {
   const auto due = [&](std::optional<TimePoint> at) { return at && *at <= now; };
   if (due(pivot_->deadline())) pivot_->on_deadline(now);
-  if (due(scanner_.deadline())) scanner_.on_deadline(now);
+  if (due(scanner_->deadline())) scanner_->on_deadline(now);
 }
 
-std::optional<TimePoint> Links::deadline() const { return earlier(pivot_->deadline(), scanner_.deadline()); }
+std::optional<TimePoint> Links::deadline() const { return earlier(pivot_->deadline(), scanner_->deadline()); }
 
 void Links::flush(TimePoint now) {
-  if (cell_.scanner().take_reopen()) scanner_.reopen(now);
+  if (cell_.scanner().take_reopen()) scanner_->reopen(now);
   if (robot_ && cell_.robot().take_reopen() && robot_connection_ != 0) robot_->close(robot_connection_, now);
   pivot_->flush(now);
-  scanner_.flush(now);
+  scanner_->flush(now);
   plc_.flush(now);
   if (robot_) robot_->flush(now);
 }

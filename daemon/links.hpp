@@ -24,7 +24,7 @@ class Links {
   Cell& cell_;
   drivers::link::TcpServer plc_;
   std::unique_ptr<drivers::link::CanLink> pivot_;
-  drivers::link::TcpClient scanner_;
+  std::unique_ptr<drivers::link::DeviceLink> scanner_;
   std::optional<drivers::link::TcpServer> robot_;
   drivers::link::ConnectionId robot_connection_ = 0;  // the one that counts; 0: none
 };

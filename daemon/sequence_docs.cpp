@@ -68,8 +68,8 @@ const char* name(sweep::State state) {
       return "Idle";
     case sweep::State::Preparing:
       return "Preparing";
-    case sweep::State::PivotAtStart:
-      return "PivotAtStart";
+    case sweep::State::AtStart:
+      return "AtStart";
     case sweep::State::Measuring:
       return "Measuring";
     case sweep::State::Sweeping:
@@ -85,11 +85,11 @@ const char* name(sweep::Input input) {
     case sweep::Input::Begin:
       return "begin";
     case sweep::Input::AtStart:
-      return "pivot at the start";
+      return "carrier at the start";
     case sweep::Input::FirstProfile:
       return "first profile";
     case sweep::Input::AtEnd:
-      return "pivot at the end";
+      return "carrier at the end";
     case sweep::Input::ScannerStopped:
       return "scanner stopped";
     case sweep::Input::DeviceFailed:
@@ -107,11 +107,11 @@ const char* name(sweep::Effect effect) {
     case sweep::Effect::None:
       return "–";
     case sweep::Effect::MoveToStartAndMeasure:
-      return "pivot to the start, scanner measures";
+      return "carrier to the start, scanner measures";
     case sweep::Effect::MoveToEnd:
-      return "pivot to the end at sweep speed";
+      return "carrier to the end at sweep speed";
     case sweep::Effect::StopScanner:
-      return "stop the scanner, last profiles get their angles";
+      return "stop the scanner, last profiles get their poses";
     case sweep::Effect::Finish:
       return "sweep done";
     case sweep::Effect::StopAndFail:
@@ -145,9 +145,9 @@ std::string sequence_markdown() {
          "## One cycle, from the PLC's request to its answer\n\n" +
          table_and_diagram(kCellRows) +
          "\n## One sweep\n\n"
-         "Pivot and scanner get ready at the same time; whichever is first waits for the other. A sweep starts from "
-         "the end that "
-         "the pivot is nearer to.\n\n" +
+         "The carrier of the scanner is the pivot, or the robot on a path that was taught it. Carrier and scanner get "
+         "ready at the same time; whichever is first waits for the other. A pivot starts from the end that it is "
+         "nearer to.\n\n" +
          table_and_diagram(sweep::kRows);
 }
 }  // namespace binpick::daemon

@@ -3,6 +3,8 @@
 #include <chrono>
 #include <stdexcept>
 
+#include "drivers/scanner/any/scanner_link.hpp"
+
 namespace binpick::tools {
 namespace link = drivers::link;
 namespace {
@@ -10,12 +12,6 @@ drivers::pivot::Options pivot_options(const config::Config& config, bool may_mov
   auto options = config.pivot;
   options.identify_only = !may_move;
   return options;
-}
-
-link::Endpoint scanner_endpoint(const config::Config& config) {
-  auto endpoint = link::parse_endpoint(config.scanner_address);
-  if (!endpoint) throw std::runtime_error("scanner.address: " + endpoint.error());
-  return *endpoint;
 }
 }  // namespace
 
@@ -43,7 +39,7 @@ bool daemon_runs(const config::Config& config) {
 
 DeviceLinks::DeviceLinks(const config::Config& config, bool may_move)
     : pivot_{pivot_options(config, may_move)},
-      scanner_{config.scanner},
+      scanner_{config.scanner_options()},
       pivot_link_{link::open_can(
           loop_, config.pivot_can, {{0x0A0U + config.pivot.module_id, 0x7FF}, {0x060U + config.pivot.module_id, 0x7FF}},
           {
@@ -53,26 +49,19 @@ DeviceLinks::DeviceLinks(const config::Config& config, bool may_move)
               .take_frames = [this] { return pivot_.take_frames(); },
           },
           config.pivot_can_listen_port)},
-      scanner_link_{loop_,
-                    scanner_endpoint(config),
-                    {
-                        .on_connected = [this](TimePoint now) { scanner_.on_connected(now); },
-                        .on_bytes = [this](ByteView bytes, TimePoint now) { scanner_.on_bytes(bytes, now); },
-                        .on_disconnected = [this](TimePoint now) { scanner_.on_disconnected(now); },
-                        .take_output = [this] { return scanner_.take_output(); },
-                    }} {}
+      scanner_link_{drivers::scanner::open_link(loop_, config.scanner_address, config.scanner_listen_port, scanner_)} {}
 
 TimePoint DeviceLinks::turn(TimePoint now, TimePoint until) {
   const auto due = [&](std::optional<TimePoint> at) { return at && *at <= now; };
   if (due(pivot_.deadline())) pivot_.on_deadline(now);
   if (due(scanner_.deadline())) scanner_.on_deadline(now);
   if (due(pivot_link_->deadline())) pivot_link_->on_deadline(now);
-  if (due(scanner_link_.deadline())) scanner_link_.on_deadline(now);
-  if (scanner_.take_reopen()) scanner_link_.reopen(now);
+  if (due(scanner_link_->deadline())) scanner_link_->on_deadline(now);
+  if (scanner_.take_reopen()) scanner_link_->reopen(now);
   pivot_link_->flush(now);
-  scanner_link_.flush(now);
+  scanner_link_->flush(now);
   const auto sessions = earlier(pivot_.deadline(), scanner_.deadline());
-  const auto links = earlier(pivot_link_->deadline(), scanner_link_.deadline());
+  const auto links = earlier(pivot_link_->deadline(), scanner_link_->deadline());
   return loop_.wait(earlier(earlier(sessions, links), until));
 }
 }  // namespace binpick::tools

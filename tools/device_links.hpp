@@ -7,10 +7,11 @@
 #include "base/clock.hpp"
 #include "config/config.hpp"
 #include "drivers/link/can.hpp"
+#include "drivers/link/device_link.hpp"
 #include "drivers/link/loop.hpp"
 #include "drivers/link/tcp.hpp"
 #include "drivers/pivot/session.hpp"
-#include "drivers/scanner/lms400/session.hpp"
+#include "drivers/scanner/any/scanner.hpp"
 
 namespace binpick::tools {
 /// Whether somebody answers at the cell's PLC address: binpickd is at work then, and holds pivot and scanner.
@@ -24,18 +25,18 @@ class DeviceLinks {
   DeviceLinks(const config::Config& config, bool may_move);
 
   drivers::pivot::Session& pivot() { return pivot_; }
-  drivers::lms400::Session& scanner() { return scanner_; }
+  drivers::scanner::Scanner& scanner() { return scanner_; }
   drivers::link::Loop& loop() { return loop_; }
 
   /// Serves deadlines, sends what there is to send, waits for the next event or `until`, whichever is first.
   TimePoint turn(TimePoint now, TimePoint until);
-  std::string scanner_trouble() const { return scanner_link_.last_error(); }
+  std::string scanner_trouble() const { return scanner_link_->last_error(); }
 
  private:
   drivers::link::Loop loop_;
   drivers::pivot::Session pivot_;
-  drivers::lms400::Session scanner_;
+  drivers::scanner::Scanner scanner_;
   std::unique_ptr<drivers::link::CanLink> pivot_link_;
-  drivers::link::TcpClient scanner_link_;
+  std::unique_ptr<drivers::link::DeviceLink> scanner_link_;
 };
 }  // namespace binpick::tools

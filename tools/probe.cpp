@@ -63,7 +63,7 @@ int probe(const std::string& cell_path) {
   TimePoint now = clock.now();
   const TimePoint began = now;
   const auto patience = [&] {
-    return began + (devices.scanner().state() == drivers::lms400::Session::State::Starting ? kSpinUpMax : kAnswerMax);
+    return began + (devices.scanner().state() == drivers::scanner::State::Starting ? kSpinUpMax : kAnswerMax);
   };
   while ((!pivot_good || !scanner_good) && now < patience()) {
     now = devices.turn(now, std::min(patience(), now + std::chrono::milliseconds(200)));
@@ -84,13 +84,10 @@ int probe(const std::string& cell_path) {
       }
     }
     while (auto event = devices.scanner().take_event()) {
-      if (const auto* ready = std::get_if<drivers::lms400::Ready>(&*event)) {
-        char text[120];
-        std::snprintf(text, sizeof text, "SICK LMS 400, set to %.0f profiles/s at %.3f deg", ready->frequency_hz,
-                      ready->resolution.in_deg());
-        scanner = text;
+      if (const auto* ready = std::get_if<drivers::scanner::Ready>(&*event)) {
+        scanner = drivers::scanner::model_name(config->scanner_options()) + ", set to " + in_words(*ready);
         scanner_good = true;
-      } else if (const auto* failed = std::get_if<drivers::lms400::Failed>(&*event)) {
+      } else if (const auto* failed = std::get_if<drivers::scanner::Failed>(&*event)) {
         scanner = failed->text;
       }
     }

@@ -7,6 +7,7 @@
 #include "base/clock.hpp"
 #include "base/overloaded.hpp"
 #include "config/config.hpp"
+#include "drivers/sweep/pivot_carrier.hpp"
 #include "drivers/sweep/sweep.hpp"
 #include "tools/commands.hpp"
 #include "tools/device_links.hpp"
@@ -24,7 +25,7 @@ using Cloud = std::vector<Eigen::Vector3f>;
 
 bool ready(DeviceLinks& devices) {
   return devices.pivot().state() == drivers::pivot::Session::State::Standing &&
-         devices.scanner().state() == drivers::lms400::Session::State::Idle;
+         devices.scanner().state() == drivers::scanner::State::Idle;
 }
 
 /// What keeps a device from being ready, as it last said itself.
@@ -32,16 +33,17 @@ struct Troubles {
   std::string pivot = "no answer from the module", scanner = "no connection";
 };
 
-bool bring_up(DeviceLinks& devices, drivers::sweep::Sweep& sweep, Troubles& troubles, TimePoint now, TimePoint until) {
+bool bring_up(DeviceLinks& devices, drivers::sweep::PivotCarrier& carrier, Troubles& troubles, TimePoint now,
+              TimePoint until) {
   while (!ready(devices)) {
     if (now >= until) return false;
     now = devices.turn(now, until);
     while (auto event = devices.pivot().take_event()) {
-      sweep.on_pivot(*event, now);
+      carrier.on(*event);
       if (const auto* failed = std::get_if<drivers::pivot::Failed>(&*event)) troubles.pivot = failed->text;
     }
     while (auto event = devices.scanner().take_event())
-      if (const auto* failed = std::get_if<drivers::lms400::Failed>(&*event)) troubles.scanner = failed->text;
+      if (const auto* failed = std::get_if<drivers::scanner::Failed>(&*event)) troubles.scanner = failed->text;
   }
   return true;
 }
@@ -75,11 +77,13 @@ int scan(const std::string& cell_path, const std::string& out_path, int supply_i
   }
 
   DeviceLinks devices{*config, true};
-  drivers::sweep::Sweep sweep{devices.pivot(), devices.scanner()};
+  drivers::sweep::PivotCarrier carrier{devices.pivot()};
+  carrier.set_latency(config->pivot_latency);
+  drivers::sweep::Sweep sweep{carrier, devices.scanner()};
   const SystemClock clock;
   TimePoint now = clock.now();
   Troubles troubles;
-  if (!bring_up(devices, sweep, troubles, now, now + kReadyMax)) {
+  if (!bring_up(devices, carrier, troubles, now, now + kReadyMax)) {
     const bool pivot = devices.pivot().state() != drivers::pivot::Session::State::Standing;
     std::fprintf(stderr, "binpick: the %s is not ready: %s; reach it with: binpick probe %s\n",
                  pivot ? "pivot" : "scanner", (pivot ? troubles.pivot : troubles.scanner).c_str(), cell_path.c_str());
@@ -87,14 +91,10 @@ int scan(const std::string& cell_path, const std::string& out_path, int supply_i
   }
 
   now = clock.now();
-  drivers::sweep::Plan plan;
-  plan.start = supply->sweep_start;
-  plan.end = supply->sweep_end;
-  plan.speed_rad_s = supply->sweep_speed_rad_s;
-  plan.positioning_speed_rad_s = supply->sweep_speed_rad_s;
-  plan.pivot_latency = config->pivot_latency;
-  plan.scanner_latency = config->scanner_latency;
-  sweep.begin(plan, now);
+  sweep.begin({.motion = drivers::sweep::PivotSweep{supply->sweep_start, supply->sweep_end, supply->sweep_speed_rad_s,
+                                                    supply->sweep_speed_rad_s},
+               .scanner_latency = config->scanner_latency},
+              now);
 
   Cloud cloud;
   std::optional<drivers::sweep::Done> done;
@@ -102,8 +102,8 @@ int scan(const std::string& cell_path, const std::string& out_path, int supply_i
   const TimePoint until = now + kSweepMax;
   const auto on_sweep = Overloaded{
       [&](const drivers::sweep::RegisteredProfile& registered) {
-        const auto T_base_scanner = vision::scanner_at(config->mount, registered.pivot);
-        vision::register_profile(registered.profile.range_mm, registered.profile.first, registered.profile.step,
+        const auto T_base_scanner = vision::scanner_at(config->mount, std::get<Angle>(registered.carrier));
+        vision::register_profile(registered.profile.x_mm, registered.profile.z_mm,
                                  supply->T_base_supply.inverse() * T_base_scanner, cloud);
       },
       [&](const drivers::sweep::Done& sweep_done) { done = sweep_done; },
@@ -111,7 +111,8 @@ int scan(const std::string& cell_path, const std::string& out_path, int supply_i
   };
   while (!done && !failure) {
     now = devices.turn(now, until);
-    while (auto event = devices.pivot().take_event()) sweep.on_pivot(*event, now);
+    while (auto event = devices.pivot().take_event())
+      if (const auto news = carrier.on(*event)) sweep.on_carrier(*news, now);
     while (auto event = devices.scanner().take_event()) sweep.on_scanner(*event, now);
     if (sweep.deadline() && *sweep.deadline() <= now) sweep.on_deadline(now);
     while (auto event = sweep.take_event()) std::visit(on_sweep, *event);
@@ -126,9 +127,9 @@ int scan(const std::string& cell_path, const std::string& out_path, int supply_i
     std::fprintf(stderr, "binpick: %s\n", saved.error().text.c_str());
     return 1;
   }
-  std::printf("%s: %zu points of %zu profiles over supply %u in %.2f s (%llu lost, %zu without an angle)\n",
+  std::printf("%s: %zu points of %zu profiles over supply %u in %.2f s (%llu lost, %zu without a pose)\n",
               out_path.c_str(), cloud.size(), done->profiles, supply->id, in_s(done->duration),
-              static_cast<unsigned long long>(done->profiles_lost), done->profiles_without_angle);
+              static_cast<unsigned long long>(done->profiles_lost), done->profiles_without_pose);
   return 0;
 }
 }  // namespace

@@ -15,9 +15,9 @@ struct ScannerMount {
 };
 Transform<frame::Base, frame::Scanner> scanner_at(const ScannerMount& mount, Angle pivot);
 
-/// One profile's points in the supply frame, mm. Point i lies at range_mm[i] * (cos a, 0, sin a) in the scanner frame,
-/// with a = first + i * step. NaN and non-positive ranges give no point.
-void register_profile(std::span<const float> range_mm, Angle first, Angle step,
+/// One profile's points in the supply frame, mm. Point i lies at (x_mm[i], 0, z_mm[i]) in the scanner frame; what is
+/// not finite, or not in front of the scanner, gives no point.
+void register_profile(std::span<const float> x_mm, std::span<const float> z_mm,
                       const Transform<frame::Supply, frame::Scanner>& T_supply_scanner,
                       std::vector<Eigen::Vector3f>& out_supply_mm);
 }  // namespace binpick::vision

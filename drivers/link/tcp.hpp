@@ -11,6 +11,7 @@
 #include "base/bytes.hpp"
 #include "base/clock.hpp"
 #include "base/expected.hpp"
+#include "drivers/link/device_link.hpp"
 #include "drivers/link/loop.hpp"
 
 /// TCP links: the only code that owns TCP sockets. They pump a session's face and know nothing of what the bytes mean.
@@ -45,19 +46,19 @@ struct TcpClientOptions {
 
 /// Connects, reconnects for ever with a capped back-off, moves bytes. TCP_NODELAY, keep-alive and TCP_USER_TIMEOUT are
 /// set: a peer that lost its power is noticed within about 3 s. A host name is resolved in a thread of its own.
-class TcpClient {
+class TcpClient final : public DeviceLink {
  public:
   TcpClient(Loop& loop, Endpoint endpoint, StreamPeer peer, TcpClientOptions options = {});
-  ~TcpClient();
+  ~TcpClient() override;
   TcpClient(const TcpClient&) = delete;
   TcpClient& operator=(const TcpClient&) = delete;
 
-  void on_deadline(TimePoint now);            ///< Starts or gives up a connection attempt when it is time.
-  std::optional<TimePoint> deadline() const;  ///< When to call on_deadline.
-  void flush(TimePoint now);                  ///< Sends what the session has to say.
-  void reopen(TimePoint now);  ///< Drops the connection; the session is told; reconnects after retry_first.
+  void on_deadline(TimePoint now) override;  ///< Starts or gives up a connection attempt when it is time.
+  std::optional<TimePoint> deadline() const override;
+  void flush(TimePoint now) override;
+  void reopen(TimePoint now) override;  ///< Reconnects after retry_first.
   bool connected() const;
-  std::string last_error() const;  ///< Why the last attempt failed, for the log ("connection refused").
+  std::string last_error() const override;  ///< Why the last attempt failed ("connection refused").
 
  private:
   enum class State { Waiting, Resolving, Connecting, Connected };

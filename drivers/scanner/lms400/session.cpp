@@ -282,12 +282,16 @@ struct Session::Impl {
     lost += reading.lost;
     Profile profile;
     profile.counter = m.counter();
-    profile.first = Angle::deg(m.start_1e4deg * 1e-4);
-    profile.step = Angle::deg(m.step_1e4deg * 1e-4);
-    profile.range_mm.reserve(m.points());
-    for (std::size_t i = 0; i < m.points(); ++i)
-      profile.range_mm.push_back(m.range_mm(i).value_or(std::numeric_limits<float>::quiet_NaN()));
-    profile.remission = m.remission;
+    const double first_rad = Angle::deg(m.start_1e4deg * 1e-4).in_rad();
+    const double step_rad = Angle::deg(m.step_1e4deg * 1e-4).in_rad();
+    profile.x_mm.reserve(m.points());
+    profile.z_mm.reserve(m.points());
+    for (std::size_t i = 0; i < m.points(); ++i) {
+      const double range = m.range_mm(i).value_or(std::numeric_limits<float>::quiet_NaN());
+      const double angle = first_rad + static_cast<double>(i) * step_rad;
+      profile.x_mm.push_back(static_cast<float>(range * std::cos(angle)));
+      profile.z_mm.push_back(static_cast<float>(range * std::sin(angle)));
+    }
     profile.received_at = now;
     profile.measured_at = reading.measured_at;
     if (profile_deadline) profile_deadline = now + options.profile_timeout;

@@ -4,13 +4,11 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <string>
-#include <variant>
-#include <vector>
 
 #include "base/bytes.hpp"
 #include "base/clock.hpp"
 #include "base/units.hpp"
+#include "drivers/scanner/profile.hpp"
 
 /// SICK LMS 400 line scanner as a session without I/O.
 namespace binpick::drivers::lms400 {
@@ -28,37 +26,18 @@ struct Options {
   std::chrono::milliseconds idle_check{1000};      ///< When idle, a harmless variable is read this often: 0 never.
 };
 
-/// One scan line. Point i lies at device angle first + i * step, in the scanner frame at
-/// range * (cos angle, 0, sin angle).
-struct Profile {
-  std::uint16_t counter = 0;  ///< The device's scan counter; a gap means lost profiles.
-  Angle first, step;
-  std::vector<float> range_mm;  ///< NaN where there is no valid measurement.
-  std::vector<std::uint8_t> remission;
-  TimePoint received_at;
-  TimePoint measured_at;  ///< received_at smoothed by the counter: the device gives no time stamp.
-};
-
-struct Ready {
-  double frequency_hz;
-  Angle resolution;
-};  ///< Configured as the device says it was really set.
-struct ProfileReceived {
-  Profile profile;
-};
-struct Stopped {};  ///< Answer to stop_measuring.
-/// Session is Offline again and the link must be reopened (see take_reopen).
-struct Failed {
-  enum class Why { NoReply, BadTelegram, Refused, NoProfiles, LinkLost } why = Why::NoReply;
-  std::string text;
-};
-using Event = std::variant<Ready, ProfileReceived, Stopped, Failed>;
+using scanner::Event;
+using scanner::Failed;
+using scanner::Profile;
+using scanner::ProfileReceived;
+using scanner::Ready;
+using scanner::Stopped;
 
 /// One connection to one LMS 400: Offline → Starting → Idle ⇄ Measuring.
 /// Owns no socket, reads no clock. Not thread-safe: used by the loop's thread only.
 class Session {
  public:
-  enum class State { Offline, Starting, Idle, Measuring };
+  using State = scanner::State;
 
   explicit Session(const Options& options);
 

@@ -134,7 +134,7 @@ struct Session::Impl {
     }
     if (state == State::Starting && steps.empty()) {
       state = State::Idle;
-      push(Ready{is_free_running() ? kFrequency_hz : 0});
+      push(Ready{.frequency_hz = is_free_running() ? kFrequency_hz : 0, .resolution = {}});
     }
     if (!steps.empty() && !step_deadline) begin_first(now);
     if (state == State::Idle && steps.empty() && options.idle_check.count() > 0) check_at = now + options.idle_check;

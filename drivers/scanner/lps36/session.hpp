@@ -5,13 +5,13 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <variant>
 #include <vector>
 
 #include "base/bytes.hpp"
 #include "base/clock.hpp"
 #include "base/units.hpp"
 #include "drivers/scanner/lps36/pairing.hpp"
+#include "drivers/scanner/profile.hpp"
 
 /// Leuze LPS 36 and LPS 36 HI line scanners as a session without I/O.
 namespace binpick::drivers::lps36 {
@@ -39,35 +39,18 @@ struct Options {
   std::chrono::milliseconds hold{30};              ///< A profile is waited for so long after a newer one came.
 };
 
-/// One scan line. Point i lies at (x_mm[i], 0, z_mm[i]) in the scanner frame, z straight ahead. The points lie on no
-/// even raster of angles: unlike an LMS 400's they cannot be given as a first angle, a step and ranges.
-struct Profile {
-  std::uint16_t counter = 0;      ///< The device's scan number; a gap means lost profiles.
-  std::uint32_t encoder = 0;      ///< Of a type with encoder input (/EN), else 0.
-  std::vector<float> x_mm, z_mm;  ///< NaN in both where nothing was measured.
-  TimePoint received_at;          ///< Its first datagram.
-  TimePoint measured_at;  ///< Free running: received_at smoothed by the counter; the device gives no time stamp.
-};
-
-struct Ready {
-  double frequency_hz = 0;  ///< 0: triggered.
-};
-struct ProfileReceived {
-  Profile profile;
-};
-struct Stopped {};  ///< Answer to stop_measuring.
-/// Session is Offline again and the link must be reopened (see take_reopen).
-struct Failed {
-  enum class Why { NoReply, BadTelegram, Refused, NoProfiles, LinkLost } why = Why::NoReply;
-  std::string text;
-};
-using Event = std::variant<Ready, ProfileReceived, Stopped, Failed>;
+using scanner::Event;
+using scanner::Failed;
+using scanner::Profile;
+using scanner::ProfileReceived;
+using scanner::Ready;
+using scanner::Stopped;
 
 /// One LPS 36: Offline → Starting → Idle ⇄ Measuring. Idle is the device's command mode: no data flow.
 /// Owns no socket, reads no clock. Not thread-safe: used by the loop's thread only.
 class Session {
  public:
-  enum class State { Offline, Starting, Idle, Measuring };
+  using State = scanner::State;
 
   explicit Session(const Options& options);
 

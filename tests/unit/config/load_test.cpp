@@ -22,8 +22,8 @@ TEST(Load, ExampleCellIsGoodAndInInnerUnits) {
   EXPECT_EQ(c.pivot_can, "can0");
   EXPECT_EQ(c.pivot.module_id, 12);
   EXPECT_EQ(c.pivot.reference_timeout, 30s);
-  EXPECT_EQ(c.scanner.frequency_hz, 360);
-  EXPECT_NEAR(c.scanner.start.in_deg(), 70, 1e-12);
+  EXPECT_EQ(c.lms400.frequency_hz, 360);
+  EXPECT_NEAR(c.lms400.start.in_deg(), 70, 1e-12);
   EXPECT_EQ(c.robot_listen, "0.0.0.0:5002");
   EXPECT_NEAR(c.reach.tilt_max_rad, 40 * M_PI / 180, 1e-12);
   ASSERT_EQ(c.supplies.size(), 1U);
@@ -54,6 +54,45 @@ TEST(Load, RotationsAreAboutFixedAxesXThenYThenZ) {
   const auto& T = loaded->mount.T_base_pivot.iso;
   EXPECT_TRUE(T.linear().isApprox(expected, 1e-12)) << T.matrix();
   EXPECT_EQ(T.translation(), Eigen::Vector3d(1201, 2, 1863));
+}
+
+/// The example cell with a Leuze scanner in the place of the SICK.
+void make_leuze(CellFolder& folder, const std::string& model) {
+  const std::size_t from = folder.cell.find("frequency_hz = 360"), to = folder.cell.find("profile_timeout_ms");
+  folder.cell.erase(from, to - from);
+  folder.edit("model = \"lms400\"", "model = \"" + model + "\"");
+  folder.edit("address = \"192.168.0.1:2111\"", "address = \"192.168.60.3:9008\"");
+}
+
+TEST(Load, ALeuzeScannerHasKeysOfItsOwn) {
+  for (const bool hi : {false, true}) {
+    CellFolder folder;
+    make_leuze(folder, hi ? "lps36hi" : "lps36");
+    folder.edit("profile_timeout_ms = 500",
+                "profile_timeout_ms = 300\nexposure = \"manual\"\nmanual_exposure_us = 200");
+    const auto loaded = folder.load();
+    ASSERT_TRUE(loaded.has_value()) << folder.findings();
+    const auto options = std::get<drivers::lps36::Options>(loaded->scanner_options());
+    EXPECT_EQ(options.hi, hi);
+    EXPECT_EQ(options.profile_timeout, 300ms);
+    EXPECT_EQ(options.exposure, drivers::lps36::Exposure::Manual);
+    EXPECT_EQ(options.manual_exposure, std::chrono::microseconds(200));
+    EXPECT_EQ(loaded->scanner_listen_port, 5634);
+  }
+}
+
+TEST(Load, KeysOfTheOtherScannerAreNamed) {
+  CellFolder folder;
+  make_leuze(folder, "lps36");
+  folder.edit("profile_timeout_ms = 500", "profile_timeout_ms = 500\nstart_deg = 70");
+  EXPECT_NE(folder.findings().find("scanner.start_deg is for scanner.model = lms400 only; remove it"),
+            std::string::npos)
+      << folder.findings();
+  folder.edit("start_deg = 70", "manual_exposure_us = 80");
+  EXPECT_NE(folder.findings().find("scanner.manual_exposure_us has no effect; write exposure = \"manual\""),
+            std::string::npos);
+  folder.edit("manual_exposure_us = 80", "manual_exposure_us = 80\nexposure = \"manual\"");
+  EXPECT_NE(folder.findings().find("80 is less than an LPS 36 can; use 98 … 1310"), std::string::npos);
 }
 
 TEST(Load, EachMakeOfRobotHasItsDialect) {
@@ -91,7 +130,7 @@ tilt_max_deg = 30
   const auto loaded = folder.load();
   ASSERT_TRUE(loaded.has_value()) << folder.findings();
   EXPECT_EQ(loaded->robot_listen, "");
-  EXPECT_EQ(loaded->scanner.range.in_deg(), 70);
+  EXPECT_EQ(loaded->lms400.range.in_deg(), 70);
   EXPECT_EQ(loaded->plc.detect_timeout, 5000ms);
   EXPECT_EQ(loaded->detection.deadline, 3000ms);
   EXPECT_EQ(loaded->recipes[0].knowledge_base, "/kb/track_link.kb");
@@ -138,7 +177,9 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"extended_remission = false", "extended_remission = 0", "extended_remission", 22,
                 "scanner.extended_remission = 0 is not a flag; write it as extended_remission = false"},
         Mistake{"model = \"lms400\"", "model = \"lms511\"", "model", 9,
-                "scanner.model = \"lms511\" is not \"lms400\"; use \"lms400\""},
+                "scanner.model = \"lms511\" is not one of \"lms400\", \"lps36\", \"lps36hi\"; use one of them"},
+        Mistake{"# exposure = \"device\"", "exposure = \"dark\"", "exposure", 12,
+                "scanner.exposure is for scanner.model = lps36, lps36hi only; remove it"},
         Mistake{"model = \"lms400\"\n", "", "[scanner]", 1,
                 "scanner.model is missing in [scanner]; add, for example: model = \"lms400\""},
         Mistake{"address = \"192.168.0.1:2111\"", "address = \"192.168.0.1\"", "address", 11,

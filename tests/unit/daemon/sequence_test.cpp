@@ -55,7 +55,7 @@ TEST(CellSequence, NoSweepWithoutAClearRobot) {
 TEST(SweepSequence, EveryRunningStateHasDeadlineAbortAndDeviceFailure) {
   using drivers::sweep::Input;
   using drivers::sweep::State;
-  for (const auto state : {State::Preparing, State::PivotAtStart, State::Measuring, State::Sweeping, State::Draining})
+  for (const auto state : {State::Preparing, State::AtStart, State::Measuring, State::Sweeping, State::Draining})
     for (const auto input : {Input::Deadline, Input::Abort, Input::DeviceFailed}) {
       const auto* row = find_row(drivers::sweep::kRows, state, input);
       ASSERT_NE(row, nullptr);

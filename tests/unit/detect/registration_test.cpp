@@ -9,21 +9,18 @@ namespace binpick::vision {
 namespace {
 TEST(Registration, StraightAheadIsTheScannersZAxis) {
   std::vector<Eigen::Vector3f> points;
-  const std::array<float, 3> ranges{100.0F, 200.0F, 300.0F};
-  register_profile(ranges, Angle::deg(45), Angle::deg(45), {}, points);
-  ASSERT_EQ(points.size(), 3U);
-  EXPECT_NEAR((points[0] - Eigen::Vector3f(70.7107F, 0, 70.7107F)).norm(), 0, 1e-3);
-  EXPECT_NEAR((points[1] - Eigen::Vector3f(0, 0, 200)).norm(), 0, 1e-3);
-  EXPECT_NEAR((points[2] - Eigen::Vector3f(-212.132F, 0, 212.132F)).norm(), 0, 1e-2);
+  const std::array<float, 3> x_mm{70.0F, 0.0F, -210.0F}, z_mm{70.0F, 200.0F, 215.0F};
+  register_profile(x_mm, z_mm, {}, points);
+  EXPECT_EQ(points, (std::vector<Eigen::Vector3f>{{70, 0, 70}, {0, 0, 200}, {-210, 0, 215}}));
 }
 
 TEST(Registration, NoEchoGivesNoPointAndPointsAreAppended) {
   std::vector<Eigen::Vector3f> points{{1, 2, 3}};
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN(), kInf = std::numeric_limits<float>::infinity();
-  const std::array<float, 6> ranges{kNan, 0.0F, -5.0F, kInf, 100.0F, kNan};
-  register_profile(ranges, Angle::deg(50), Angle::deg(10), {}, points);
+  const std::array<float, 6> x_mm{kNan, 0.0F, 3.0F, 1.0F, 7.0F, kInf}, z_mm{kNan, 0.0F, -5.0F, kInf, 100.0F, 5.0F};
+  register_profile(x_mm, z_mm, {}, points);
   ASSERT_EQ(points.size(), 2U);
-  EXPECT_NEAR(points[1].z(), 100.0, 1e-3);
+  EXPECT_EQ(points[1], Eigen::Vector3f(7, 0, 100));
 }
 
 // Scanner 200 mm beside the pivot's axis, looking down; the pivot turns about the base's y axis.
@@ -48,8 +45,8 @@ TEST(Registration, AProfileLandsInTheSupplyFrame) {
   T_supply_scanner.iso.translation() = Eigen::Vector3d(10, 20, 1800);
   T_supply_scanner.iso.linear() = Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitX()).matrix();
   std::vector<Eigen::Vector3f> points;
-  const std::array<float, 1> range{1750.0F};
-  register_profile(range, Angle::deg(90), Angle::deg(0.25), T_supply_scanner, points);
+  const std::array<float, 1> x_mm{0.0F}, z_mm{1750.0F};
+  register_profile(x_mm, z_mm, T_supply_scanner, points);
   ASSERT_EQ(points.size(), 1U);
   EXPECT_NEAR((points[0] - Eigen::Vector3f(10, 20, 50)).norm(), 0, 1e-3);
 }

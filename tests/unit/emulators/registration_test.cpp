@@ -69,7 +69,7 @@ std::vector<Eigen::Vector3f> sweep(double speed_deg_s, Duration latency_error, c
       if (received == nullptr || received->profile.measured_at < begin) continue;
       const auto& profile = received->profile;
       vision::register_profile(
-          profile.range_mm, profile.first, profile.step,
+          profile.x_mm, profile.z_mm,
           place.T_base_supply.inverse() * vision::scanner_at(mount, pivot(profile.measured_at - latency_error)),
           points);
     }

@@ -23,7 +23,7 @@ TEST(Lms400Session, StartsInTheKnownOrderAndIsReady) {
                                                  "sWN MDblex 1", "sMN mSCsetscanconfig +360.00 +0.25 +55.00 +70.00"}));
   ASSERT_EQ(pair.ready.size(), 1U);
   EXPECT_DOUBLE_EQ(pair.ready[0].frequency_hz, 360);
-  EXPECT_DOUBLE_EQ(pair.ready[0].resolution.in_deg(), 0.25);
+  EXPECT_DOUBLE_EQ(pair.ready[0].resolution.value().in_deg(), 0.25);
   EXPECT_TRUE(pair.device.logged_in());
 }
 
@@ -36,11 +36,13 @@ TEST(Lms400Session, MeasuresOneProfilePerPeriodAndStops) {
   pair.run_for(1s);
   EXPECT_NEAR(static_cast<double>(pair.profiles.size()), 360, 8);
   const Profile& profile = pair.profiles.back();
-  EXPECT_EQ(profile.range_mm.size(), 280U);
-  EXPECT_EQ(profile.range_mm[7], 1800.F);
-  EXPECT_EQ(profile.remission[7], 120);
-  EXPECT_NEAR(profile.first.in_deg(), 55, 1e-9);
-  EXPECT_NEAR(profile.step.in_deg(), 0.25, 1e-9);
+  ASSERT_EQ(profile.x_mm.size(), 280U);
+  ASSERT_EQ(profile.z_mm.size(), 280U);
+  for (const std::size_t i : {0U, 7U, 279U}) {
+    const double angle = Angle::deg(55 + 0.25 * static_cast<double>(i)).in_rad();
+    EXPECT_NEAR(profile.x_mm[i], 1800 * std::cos(angle), 1e-3);
+    EXPECT_NEAR(profile.z_mm[i], 1800 * std::sin(angle), 1e-3);
+  }
   for (std::size_t i = 1; i < pair.profiles.size(); ++i) {
     EXPECT_EQ(pair.profiles[i].counter, static_cast<std::uint16_t>(pair.profiles[i - 1].counter + 1));
     EXPECT_NEAR(in_ms(pair.profiles[i].measured_at - pair.profiles[i - 1].measured_at), 1000 / 360.0, 0.01);
@@ -76,7 +78,7 @@ TEST(Lms400Session, SaysWhatTheDeviceReallySet) {
   Pair pair{options};
   pair.connect();
   ASSERT_TRUE(pair.run_until(State::Idle));
-  EXPECT_NEAR(pair.ready.at(0).resolution.in_deg(), 0.25, 1e-6);
+  EXPECT_NEAR(pair.ready.at(0).resolution.value().in_deg(), 0.25, 1e-6);
   EXPECT_TRUE(
       pair.logged("set to 360.0 Hz and 0.250 deg instead of 360.0 Hz and 0.230 deg (quality 00000008); write these"));
 }
