@@ -77,7 +77,7 @@ std::string encode(const PoseLine& line, Dialect dialect) {
   const Eigen::Vector3d angles = format.to_angles(line.T_base_sent.linear());
   char text[kLineBytesMax + 4];
   const int length = std::snprintf(
-      text, sizeof text, "pose %u %.0f %.*f %.*f %.*f %.*f %.*f %.*f\r\n", unsigned{line.sequence}, line.time_ms,
+      text, sizeof text, "pose %u %.1f %.*f %.*f %.*f %.*f %.*f %.*f\r\n", unsigned{line.sequence}, line.time_ms,
       format.length_decimals, position.x(), format.length_decimals, position.y(), format.length_decimals, position.z(),
       format.angle_decimals, angles.x(), format.angle_decimals, angles.y(), format.angle_decimals, angles.z());
   BINPICK_CHECK(length > 0 && static_cast<std::size_t>(length) <= kLineBytesMax + 2);

@@ -37,7 +37,7 @@ std::string encode(const PoseLine& line, Dialect dialect);
 struct PoseStreamOptions {
   Dialect dialect = Dialect::Fanuc;
   /// The tcp whose pose is sent; identity: the flange itself.
-  Transform<frame::Flange, frame::Tcp> T_flange_tcp;
+  Transform<frame::Flange, frame::Tcp> T_flange_tcp{};
   std::chrono::milliseconds silence_max{500};  ///< Without a line that is understood.
 };
 

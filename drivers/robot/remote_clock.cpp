@@ -59,8 +59,8 @@ RemoteClock::Reading RemoteClock::add(double sender_s, TimePoint arrival) {
   last_arrival_ = moved_at_ = arrival;
   stop_told_ = false;
   if (!least_ || a.late_s < least_->late_s) least_ = a;
-  if (above_s < 0) line_.late_s += above_s;
   if (a.at_s - window_begin_s_ >= kWindow_s) close_window(a.at_s);
+  line_.late_s += std::min(0.0, a.late_s - line_.at(a.at_s));
   return Reading::Good;
 }
 

@@ -12,11 +12,11 @@
 namespace binpick::drivers::rtde {
 struct Options {
   /// Samples per second; absent: all that the controller has, 500 Hz from software 5 on, 125 Hz before (CB3).
-  std::optional<double> frequency_hz;
+  std::optional<double> frequency_hz{};
   /// RTDE gives the pose of the active tcp. Controllers from software 3.12 and 5.5.1 on tell where that tcp sits on the
   /// flange, and it is taken off again, also when a program changes it. For older ones it has to be given here, and no
   /// program may change it while the robot scans.
-  std::optional<Transform<frame::Flange, frame::Tcp>> T_flange_tcp;
+  std::optional<Transform<frame::Flange, frame::Tcp>> T_flange_tcp{};
   std::chrono::milliseconds reply_timeout{1000};  ///< For each step of the handshake.
   std::chrono::milliseconds silence_max{250};     ///< Without a pose while they should come.
 };
