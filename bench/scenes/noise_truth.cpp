@@ -158,7 +158,8 @@ std::vector<Vector3d> table_scan(const TableScan& scan) {
   double angle = 0;
   emulators::RangeNoise noise;
   noise.sigma_mm = scan.sigma_mm;
-  const emulators::ScannerView view{world, place, [&](TimePoint) { return Angle::rad(angle); }, noise};
+  const emulators::ScannerView view{world, emulators::on_pivot(place, [&](TimePoint) { return Angle::rad(angle); }),
+                                    noise};
   std::vector<Vector3d> points;
   const Angle first = Angle::deg(55), step = Angle::rad(step_rad);
   for (int line = 0; line < scan.lines; ++line) {

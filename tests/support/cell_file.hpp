@@ -8,8 +8,9 @@
 #include "daemon/cell_data.hpp"
 
 namespace binpick::support {
-/// What tests vary in a cell file; the rest is one LMS 400 cell: a lattice box under a pivot.
+/// What tests vary in a cell file; the rest is one cell: an LMS 400 over a lattice box, or an LPS 36 over a small box.
 struct CellFile {
+  std::string scanner = "lms400";  ///< scanner.model; size and place of the supply and the sweep go with it.
   std::string word_order = "s7";
   std::string robot = "ur";                         ///< robot.dialect and plc.pose_convention.
   std::vector<std::string> parts = {"track_link"};  ///< Example parts that the build has trained; ids 1, 2, ….

@@ -34,13 +34,21 @@ emulators::RangeNoise noise(std::uint64_t seed) {
   noise.seed = seed;
   return noise;
 }
+
+emulators::LightSection light_section(const config::Config& config, std::uint64_t seed) {
+  using emulators::LightSection;
+  LightSection device = config.scanner_model == config::ScannerModel::Lps36Hi ? LightSection::hi() : LightSection{};
+  device.seed = seed;
+  return device;
+}
 }  // namespace
 
 EmulatedCell::EmulatedCell(std::shared_ptr<const daemon::CellData> data, emulators::World scene, std::uint64_t seed)
     : world{std::move(scene)},
       pivot{pivot_options(data->config, seed)},
-      scanner{emulators::ScannerView{world, scanner_place(data->config),
-                                     [this](TimePoint at) { return pivot.angle_at(at); }, noise(seed)}},
+      scanner{emulators::ScannerView{world, where_scanner(data->config), noise(seed)}},
+      lps36{emulators::Lps36View{world, where_scanner(data->config), light_section(data->config, seed)},
+            {.hi = data->config.scanner_model == config::ScannerModel::Lps36Hi, .seed = seed}},
       plc{plc_options(data->config)},
       robot{robot_options(data->config)},
       data_{std::move(data)},
@@ -50,9 +58,14 @@ EmulatedCell::EmulatedCell(std::shared_ptr<const daemon::CellData> data, emulato
   start_daemon();
 }
 
+emulators::WhereScanner EmulatedCell::where_scanner(const config::Config& config) {
+  return emulators::on_pivot(scanner_place(config), [this](TimePoint at) { return pivot.angle_at(at); });
+}
+
 void EmulatedCell::start_daemon() {
   cell_ = std::make_unique<daemon::Cell>(data_, ++boot_count_);
   can_up_ = false;
+  udp_up_at_ = now_;
 }
 
 void EmulatedCell::kill_daemon() {
@@ -83,7 +96,7 @@ Wire EmulatedCell::plc_wire() {
 
 Wire EmulatedCell::scanner_wire() {
   return {{
-              .there = [this] { return cell_ != nullptr; },
+              .there = [this] { return cell_ != nullptr && !cell_->scanner().by_datagrams(); },
               .on_connected = [this](TimePoint t) { cell_->scanner().on_connected(t); },
               .on_bytes = [this](ByteView b, TimePoint t) { cell_->scanner().on_bytes(b, t); },
               .on_disconnected = [this](TimePoint t) { cell_->scanner().on_disconnected(t); },
@@ -134,11 +147,31 @@ bool EmulatedCell::pump_frames() {
   return moved;
 }
 
+bool EmulatedCell::pump_datagrams() {
+  if (!cell_ || !cell_->scanner().by_datagrams()) return false;
+  auto& session = cell_->scanner();
+  if (session.take_reopen()) {
+    session.on_disconnected(now_);
+    session.take_frames();
+    udp_up_at_ = now_ + std::chrono::seconds(1);
+  }
+  bool moved = false;
+  if (udp_up_at_ && *udp_up_at_ <= now_) {
+    udp_up_at_.reset();
+    session.on_connected(now_);
+    moved = true;
+  }
+  for (const Bytes& datagram : session.take_frames()) lps36.on_frame(datagram, now_), moved = true;
+  for (const Bytes& datagram : lps36.take_frames()) session.on_bytes(datagram, now_), moved = true;
+  return moved;
+}
+
 void EmulatedCell::pump() {
   for (int rounds = 0;; ++rounds) {
     BINPICK_CHECK(rounds < 100'000);
     plc.set_robot_clear(robot.clear_of_view() && !robot_in_the_way);
     bool moved = pump_frames();
+    moved |= pump_datagrams();
     moved |= plc_wire_.pump(now_);
     moved |= scanner_wire_.pump(now_);
     moved |= robot_wire_.pump(now_);
@@ -169,6 +202,7 @@ void EmulatedCell::serve_deadlines() {
   const auto due = [&](std::optional<TimePoint> at) { return at && *at <= now_; };
   if (due(pivot.deadline())) pivot.on_deadline(now_);
   if (due(scanner.deadline())) scanner.on_deadline(now_);
+  if (due(lps36.deadline())) lps36.on_deadline(now_);
   if (due(plc.deadline())) plc.on_deadline(now_);
   if (due(robot.deadline())) robot.on_deadline(now_);
 }
@@ -176,6 +210,7 @@ void EmulatedCell::serve_deadlines() {
 std::optional<TimePoint> EmulatedCell::next_deadline() const {
   auto next = earlier(earlier(pivot.deadline(), scanner.deadline()), earlier(plc.deadline(), robot.deadline()));
   next = earlier(next, earlier(plc_wire_.deadline(), earlier(scanner_wire_.deadline(), robot_wire_.deadline())));
+  next = earlier(next, earlier(lps36.deadline(), udp_up_at_));
   if (cell_) next = earlier(next, cell_->deadline());
   if (looking_ && !worker_hangs) next = earlier(next, looked_at_);
   return next;

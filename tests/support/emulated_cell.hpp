@@ -13,6 +13,7 @@
 #include "tests/emulators/plc/plc.hpp"
 #include "tests/emulators/robot/robot.hpp"
 #include "tests/emulators/scanner/lms400_device.hpp"
+#include "tests/emulators/scanner/lps36_view.hpp"
 #include "tests/emulators/scanner/scanner_view.hpp"
 #include "tests/emulators/world/world.hpp"
 #include "tests/support/wire.hpp"
@@ -28,7 +29,8 @@ class EmulatedCell {
 
   emulators::World world;
   emulators::Pivot pivot;
-  emulators::Lms400 scanner;
+  emulators::Lms400 scanner;  ///< One of the two is wired, by the cell file.
+  emulators::Lps36 lps36;
   emulators::Plc plc;
   emulators::Robot robot;
   /// The robot's signal "clear of the view" is wired to the PLC; a test may hold it down.
@@ -60,11 +62,13 @@ class EmulatedCell {
   const std::vector<daemon::DetectResult>& results() const { return results_; }  ///< Of all detections, oldest first.
 
  private:
+  emulators::WhereScanner where_scanner(const config::Config& config);
   Wire plc_wire();
   Wire scanner_wire();
   Wire robot_wire();
   void pump();
   bool pump_frames();
+  bool pump_datagrams();
   void serve_deadlines();
   std::optional<TimePoint> next_deadline() const;
 
@@ -75,6 +79,7 @@ class EmulatedCell {
   plc::ConnectionId plc_connection_ = 0;
   Wire plc_wire_, scanner_wire_, robot_wire_;
   bool can_up_ = false;
+  std::optional<TimePoint> udp_up_at_;           // the socket to an LPS 36 opens; nothing: it is open
   std::optional<daemon::DetectResult> looking_;  // comes out at looked_at_
   TimePoint looked_at_{};
   vision::DepthImage last_image_;

@@ -8,20 +8,18 @@
 
 namespace binpick::support {
 namespace {
-const Eigen::Vector3d kSupplySize_mm{1000, 800, 500};
-
 /// The gripper takes an object whose centroid is not further from the tcp than the part is long.
 constexpr double kGripReachDiameters = 0.6;
 }  // namespace
 
-emulators::World empty_scene() { return emulators::World{kSupplySize_mm}; }
+emulators::World empty_scene() { return emulators::World{kLatticeBox_mm}; }
 
-emulators::World scene_of(const std::string& part, int count, std::uint64_t seed) {
-  return emulators::make_pile(emulators::example_part(part), count, kSupplySize_mm, seed);
+emulators::World scene_of(const std::string& part, int count, std::uint64_t seed, const Eigen::Vector3d& supply_mm) {
+  return emulators::make_pile(emulators::example_part(part), count, supply_mm, seed);
 }
 
 emulators::World scene_with_block() {
-  emulators::World world{kSupplySize_mm};
+  emulators::World world{kLatticeBox_mm};
   Transform<frame::Supply, frame::Object> T_supply_object;
   T_supply_object.iso.translation() = Eigen::Vector3d{0, 0, 50};
   T_supply_object.iso.rotate(Eigen::AngleAxisd{20 * std::numbers::pi / 180, Eigen::Vector3d::UnitZ()});

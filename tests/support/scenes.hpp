@@ -9,11 +9,14 @@
 #include "vision/knowledge_base.hpp"
 #include "vision/symmetry.hpp"
 
-/// Scenes with known truth in the tests' one supply (1000 × 800 × 500 mm).
+/// Scenes with known truth in the tests' supplies.
 namespace binpick::support {
+inline const Eigen::Vector3d kLatticeBox_mm{1000, 800, 500};  ///< Of an LMS 400's cell.
+inline const Eigen::Vector3d kSmallBox_mm{300, 300, 120};     ///< Of an LPS 36's.
 emulators::World empty_scene();
 /// `count` objects dropped and settled.
-emulators::World scene_of(const std::string& part, int count, std::uint64_t seed);
+emulators::World scene_of(const std::string& part, int count, std::uint64_t seed,
+                          const Eigen::Vector3d& supply_mm = kLatticeBox_mm);
 /// A block of 300 × 200 × 100 mm flat on the floor, its middle at the supply's origin, turned by 20 degrees about z.
 /// Nobody's part.
 emulators::World scene_with_block();

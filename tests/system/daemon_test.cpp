@@ -148,9 +148,9 @@ TEST(Daemon, OneFaultOfEachDeviceOverSockets) {
   recovers("pivot, emergency stop", plc::Alarm::PivotPowerFault);
 
   ASSERT_TRUE(reach_sweep(cell));
-  cell.scanner().faults.unplugged = true;
+  cell.scanner_faults().unplugged = true;
   ASSERT_TRUE(cell.run_until([&] { return cell.plc().fault(); }, 3s));
-  cell.scanner().faults = {};
+  cell.scanner_faults() = {};
   recovers("scanner, pulled", plc::Alarm::ScannerNoReply);
 
   const auto picks = cell.robot().picks_done();

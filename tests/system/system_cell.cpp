@@ -14,8 +14,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "tests/emulators/scanner/scanner_view.hpp"
-
 extern char** environ;
 
 namespace binpick::support {
@@ -83,9 +81,8 @@ SystemCell::SystemCell(CellFile file, emulators::World scene) : file_{std::move(
   pivot_ = std::make_unique<emulators::PivotPort>(config_->pivot_can, pivot);
   const emulators::ScannerPlace place{config_->mount.T_base_pivot, config_->mount.T_pivot_scanner,
                                       config_->supplies.front().T_base_supply};
-  scanner_ = std::make_unique<emulators::ScannerPort>(
-      loop_, config_->scanner_address,
-      emulators::ScannerView{world_, place, [this](TimePoint at) { return pivot_->angle_at(at); }}, 1);
+  scanner_ = emulators::open_scanner(
+      loop_, *config_, world_, emulators::on_pivot(place, [this](TimePoint at) { return pivot_->angle_at(at); }), 1);
   robot_ = std::make_unique<emulators::RobotPort>(loop_, *drivers::link::parse_endpoint(config_->robot_listen),
                                                   emulators::Robot{{.dialect = config_->robot.dialect}});
   plc_ = std::make_unique<emulators::PlcPort>(loop_, *drivers::link::parse_endpoint(config_->plc_listen),

@@ -24,7 +24,7 @@ class SystemCell {
   SystemCell& operator=(const SystemCell&) = delete;
 
   emulators::PivotPort& pivot() { return *pivot_; }
-  emulators::Lms400& scanner() { return scanner_->scanner; }
+  emulators::Faults& scanner_faults() { return scanner_->faults(); }
   emulators::Robot& robot() { return robot_->device; }
   emulators::Plc& plc() { return plc_->device; }
 

@@ -4,6 +4,8 @@
 #include <string_view>
 
 #include "drivers/link/cannelloni_link.hpp"
+#include "tests/emulators/scanner/lps36_view.hpp"
+#include "tests/emulators/scanner/scanner_view.hpp"
 
 namespace binpick::emulators {
 namespace link = drivers::link;
@@ -68,7 +70,7 @@ void PivotPort::run() {
   }
 }
 
-ScannerPort::ScannerPort(link::Loop& loop, const std::string& listen, Lms400::Measure measure, std::uint64_t seed)
+Lms400Port::Lms400Port(link::Loop& loop, const std::string& listen, Lms400::Measure measure, std::uint64_t seed)
     : scanner{std::move(measure), {.seed = seed}},
       server_{loop,
               endpoint(listen, "scanner"),
@@ -97,9 +99,39 @@ ScannerPort::ScannerPort(link::Loop& loop, const std::string& listen, Lms400::Me
               },
               {.connections_max = 2, .newest_wins = true, .unsent_bytes_max = 4 << 20}} {}
 
-void ScannerPort::turn(TimePoint now) {
+void Lms400Port::turn(TimePoint now) {
   if (scanner.faults.unplugged && connection_ != 0) server_.close(connection_, now);
   if (scanner.deadline() && *scanner.deadline() <= now) scanner.on_deadline(now);
   server_.flush(now);
+}
+
+Lps36Port::Lps36Port(link::Loop& loop, const std::string& listen, Lps36::Measure measure, const Lps36::Options& options)
+    : scanner{std::move(measure), options},
+      link_{loop,
+            endpoint(listen, "scanner"),
+            {.on_connected = {},
+             .on_frame = [this](ByteView bytes, TimePoint now) { scanner.on_frame(bytes, now); },
+             .on_disconnected = {},
+             .take_frames = [this] { return scanner.take_frames(); },
+             .on_other_peer = {}},
+            "scanner"} {}
+
+void Lps36Port::turn(TimePoint now) {
+  if (scanner.deadline() && *scanner.deadline() <= now) scanner.on_deadline(now);
+  if (link_.deadline() && *link_.deadline() <= now) link_.on_deadline(now);
+  link_.flush(now);
+}
+
+std::unique_ptr<ScannerPort> open_scanner(link::Loop& loop, const config::Config& config, const World& world,
+                                          WhereScanner where, std::uint64_t seed) {
+  using enum config::ScannerModel;
+  if (config.scanner_model == Lms400)
+    return std::make_unique<Lms400Port>(loop, config.scanner_address,
+                                        ScannerView{world, std::move(where), {.seed = seed}}, seed);
+  const bool is_hi = config.scanner_model == Lps36Hi;
+  LightSection device = is_hi ? LightSection::hi() : LightSection{};
+  device.seed = seed;
+  return std::make_unique<Lps36Port>(loop, config.scanner_address, Lps36View{world, std::move(where), device},
+                                     Lps36::Options{.hi = is_hi, .seed = seed});
 }
 }  // namespace binpick::emulators

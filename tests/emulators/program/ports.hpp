@@ -9,13 +9,18 @@
 #include <thread>
 
 #include "base/clock.hpp"
+#include "config/config.hpp"
 #include "drivers/link/can.hpp"
 #include "drivers/link/loop.hpp"
 #include "drivers/link/tcp.hpp"
+#include "drivers/link/udp_link.hpp"
 #include "tests/emulators/pivot/pivot.hpp"
 #include "tests/emulators/plc/plc.hpp"
 #include "tests/emulators/robot/robot.hpp"
 #include "tests/emulators/scanner/lms400_device.hpp"
+#include "tests/emulators/scanner/lps36_device.hpp"
+#include "tests/emulators/scanner/scanner_place.hpp"
+#include "tests/emulators/world/world.hpp"
 
 /// The emulated devices on real sockets. The devices are the same objects that tests run in memory.
 namespace binpick::emulators {
@@ -50,13 +55,22 @@ class PivotPort {
   std::thread thread_;
 };
 
-/// The scanner as a TCP server with one client.
+/// The scanner on its socket, whatever it speaks.
 class ScannerPort {
  public:
-  ScannerPort(drivers::link::Loop& loop, const std::string& listen, Lms400::Measure measure, std::uint64_t seed);
-  void turn(TimePoint now);
-  std::optional<TimePoint> deadline() const { return scanner.deadline(); }
-  std::uint16_t port() const { return server_.port(); }
+  virtual ~ScannerPort() = default;
+  virtual void turn(TimePoint now) = 0;
+  virtual std::optional<TimePoint> deadline() const = 0;
+  virtual Faults& faults() = 0;
+};
+
+/// An LMS 400: TCP server with one client.
+class Lms400Port final : public ScannerPort {
+ public:
+  Lms400Port(drivers::link::Loop& loop, const std::string& listen, Lms400::Measure measure, std::uint64_t seed);
+  void turn(TimePoint now) override;
+  std::optional<TimePoint> deadline() const override { return scanner.deadline(); }
+  Faults& faults() override { return scanner.faults; }
 
   Lms400 scanner;
 
@@ -64,6 +78,25 @@ class ScannerPort {
   drivers::link::ConnectionId connection_ = 0;
   drivers::link::TcpServer server_;
 };
+
+/// An LPS 36: UDP, answers whoever spoke last.
+class Lps36Port final : public ScannerPort {
+ public:
+  Lps36Port(drivers::link::Loop& loop, const std::string& listen, Lps36::Measure measure,
+            const Lps36::Options& options);
+  void turn(TimePoint now) override;
+  std::optional<TimePoint> deadline() const override { return earlier(scanner.deadline(), link_.deadline()); }
+  Faults& faults() override { return scanner.faults; }
+
+  Lps36 scanner;
+
+ private:
+  drivers::link::UdpLink link_;
+};
+
+/// Plays the scanner of a cell file, looking at `world` from where `where` says.
+std::unique_ptr<ScannerPort> open_scanner(drivers::link::Loop& loop, const config::Config& config, const World& world,
+                                          WhereScanner where, std::uint64_t seed);
 
 /// A device that is a TCP client of the daemon: robot or PLC. `wants_link` false: no connection is tried.
 template <class Client>

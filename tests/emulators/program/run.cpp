@@ -9,7 +9,6 @@
 #include <unistd.h>
 
 #include "tests/emulators/program/pick_line.hpp"
-#include "tests/emulators/scanner/scanner_view.hpp"
 
 namespace binpick::emulators {
 namespace link = drivers::link;
@@ -70,13 +69,9 @@ void Run::open_devices() {
   }
   if (options_.devices.contains(Device::Scanner)) {
     if (!pivot_) throw std::runtime_error("the scanner's view turns with the pivot: play both, \"pivot scanner\"");
-    scanner_ = std::make_unique<ScannerPort>(
-        loop_, config_.scanner_address,
-        ScannerView{bin_.world(),
-                    {config_.mount.T_base_pivot, config_.mount.T_pivot_scanner, supply.T_base_supply},
-                    [this](TimePoint at) { return pivot_->angle_at(at); },
-                    {.seed = options_.bin.seed}},
-        options_.bin.seed);
+    const ScannerPlace place{config_.mount.T_base_pivot, config_.mount.T_pivot_scanner, supply.T_base_supply};
+    scanner_ = open_scanner(loop_, config_, bin_.world(),
+                            on_pivot(place, [this](TimePoint at) { return pivot_->angle_at(at); }), options_.bin.seed);
   }
   if (options_.devices.contains(Device::Robot)) {
     if (config_.robot_listen.empty())
@@ -302,7 +297,7 @@ void Run::obey(const FaultCommand& command) {
       break;
     case Device::Scanner:
       played = scanner_ != nullptr;
-      if (played) command.apply(scanner_->scanner.faults);
+      if (played) command.apply(scanner_->faults());
       break;
     case Device::Robot:
       played = robot_ != nullptr;

@@ -26,15 +26,11 @@ struct Echo {
 };
 }  // namespace
 
-ScannerView::ScannerView(const World& world, const ScannerPlace& place, std::function<Angle(TimePoint)> pivot_angle,
-                         const RangeNoise& noise)
-    : world_{&world}, place_{place}, pivot_angle_{std::move(pivot_angle)}, noise_{noise} {}
+ScannerView::ScannerView(const World& world, WhereScanner where, const RangeNoise& noise)
+    : world_{&world}, where_{std::move(where)}, noise_{noise} {}
 
 ScanLine ScannerView::operator()(TimePoint middle, Angle first, Angle step, std::size_t points) const {
-  const Transform<frame::Pivot, frame::Pivot> turn{
-      Eigen::Isometry3d{Eigen::AngleAxisd{pivot_angle_(middle).in_rad(), Vector3d::UnitZ()}}};
-  const Eigen::Isometry3d T_supply_scanner =
-      (place_.T_base_supply.inverse() * place_.T_base_pivot * turn * place_.T_pivot_scanner).iso;
+  const Eigen::Isometry3d T_supply_scanner = where_(middle).iso;
   const Vector3d origin = T_supply_scanner.translation();
   const auto cast = [&](double along_rad, double across_rad) -> std::optional<Echo> {
     const Vector3d direction{std::cos(along_rad) * std::cos(across_rad), std::sin(across_rad),

@@ -1,22 +1,12 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 
-#include "base/clock.hpp"
-#include "base/frames.hpp"
-#include "base/units.hpp"
 #include "tests/emulators/scanner/lms400_device.hpp"
+#include "tests/emulators/scanner/scanner_place.hpp"
 #include "tests/emulators/world/world.hpp"
 
 namespace binpick::emulators {
-/// Where scanner, pivot and supply stand: T_base_scanner = T_base_pivot · Rz(pivot angle) · T_pivot_scanner.
-struct ScannerPlace {
-  Transform<frame::Base, frame::Pivot> T_base_pivot;
-  Transform<frame::Pivot, frame::Scanner> T_pivot_scanner;
-  Transform<frame::Base, frame::Supply> T_base_supply;
-};
-
 /// How an LMS 400 errs. Default: as its data sheet is remembered; `exact()` for geometry alone.
 struct RangeNoise {
   double sigma_mm = 3;       ///< One standard deviation on a white surface, head on. Grows with less light, see below.
@@ -35,7 +25,7 @@ struct RangeNoise {
   }
 };
 
-/// The emulated scanner's eye: each line is cast from where the pivot really stands at that moment. All points of a
+/// The emulated scanner's eye: each line is cast from where it really stands at that moment. All points of a
 /// line belong to its middle: at 360 lines a second and 35 degrees a second of sweep, half a line is 0.05 degrees.
 ///
 /// Noise, after phase-shift time of flight: sigma · sqrt(0.9 / (reflectance · cos incidence)) up to sigma_max; at edges
@@ -44,15 +34,13 @@ struct RangeNoise {
 class ScannerView {
  public:
   /// `world` must outlive this; objects may vanish from it between lines.
-  ScannerView(const World& world, const ScannerPlace& place, std::function<Angle(TimePoint)> pivot_angle,
-              const RangeNoise& noise = {});
+  ScannerView(const World& world, WhereScanner where, const RangeNoise& noise = {});
 
   ScanLine operator()(TimePoint middle, Angle first, Angle step, std::size_t points) const;
 
  private:
   const World* world_;
-  ScannerPlace place_;
-  std::function<Angle(TimePoint)> pivot_angle_;
+  WhereScanner where_;
   RangeNoise noise_;
 };
 }  // namespace binpick::emulators

@@ -42,7 +42,7 @@ std::vector<Eigen::Vector3f> sweep(double speed_deg_s, Duration latency_error, c
   const auto pivot = [&](TimePoint t) {
     return Angle::deg(std::clamp(-16 + speed_deg_s * in_s(t - begin), -16., 16.));
   };
-  Lms400 device{ScannerView{world, place, pivot, noise}};
+  Lms400 device{ScannerView{world, on_pivot(place, pivot), noise}};
   drivers::lms400::Options options;
   options.start = Angle::deg(70);
   options.range = Angle::deg(40);

@@ -41,7 +41,7 @@ Vector3d point_of(const ScannerPlace& place, Angle pivot, Angle at, double range
 
 TEST(ScannerView, ExactRangesOfTheFloorAreTheGeometry) {
   const World world{{1000, 800, 0}};
-  const ScannerView view{world, above(1800), [](TimePoint) { return Angle::deg(10); }, RangeNoise::exact()};
+  const ScannerView view{world, on_pivot(above(1800), [](TimePoint) { return Angle::deg(10); }), RangeNoise::exact()};
   const ScanLine line = view(kNow, Angle::deg(70), Angle::deg(1), 41);
   ASSERT_EQ(line.range_mm.size(), 41U);
   for (std::size_t i = 0; i < 41; ++i) {
@@ -62,7 +62,7 @@ TEST(ScannerView, LooksFromWhereThePivotStandsAtThatMoment) {
   const ScannerPlace place = above(1800);
   const double over_block_deg = std::atan2(-300, 1750) / kDeg;
   const auto angle = [&](TimePoint t) { return Angle::deg(over_block_deg + 30 * (in_s(t - kNow) - 1)); };
-  const ScannerView view{world, place, angle, RangeNoise::exact()};
+  const ScannerView view{world, on_pivot(place, angle), RangeNoise::exact()};
   const auto height_at = [&](TimePoint t) {
     return point_of(place, angle(t), Angle::deg(90),
                     static_cast<double>(view(t, Angle::deg(90), Angle::deg(1), 1).range_mm[0]))
@@ -79,7 +79,7 @@ TEST(ScannerView, SpreadIsThreeMillimetresOnWhiteAndGrowsInTheDark) {
     Transform<frame::Supply, frame::Object> T;
     T.iso = Eigen::Translation3d{0, 0, 10};
     world.add("table", std::make_shared<RayMesh>(box_mesh({1000, 800, 20})), T, reflectance);
-    const ScannerView view{world, above(1500), [](TimePoint) { return Angle{}; }};
+    const ScannerView view{world, on_pivot(above(1500), [](TimePoint) { return Angle{}; })};
     double sum = 0, squares = 0;
     constexpr int n = 4000;
     for (int k = 0; k < n; ++k) {
@@ -96,10 +96,10 @@ TEST(ScannerView, SpreadIsThreeMillimetresOnWhiteAndGrowsInTheDark) {
 TEST(ScannerView, SameTimeAndSeedSameLine) {
   const World world = make_pile(example_part("track_link"), 4, {1000, 800, 500}, 2);
   const auto still = [](TimePoint) { return Angle{}; };
-  const ScannerView a{world, above(1800), still}, b{world, above(1800), still};
+  const ScannerView a{world, on_pivot(above(1800), still)}, b{world, on_pivot(above(1800), still)};
   RangeNoise other;
   other.seed = 2;
-  const ScannerView c{world, above(1800), still, other};
+  const ScannerView c{world, on_pivot(above(1800), still), other};
   const auto line = [](const ScannerView& view, TimePoint t) {
     auto ranges = view(t, Angle::deg(70), Angle::deg(0.25), 160).range_mm;
     for (float& r : ranges) r = std::isnan(r) ? 0 : r;
@@ -119,7 +119,7 @@ TEST(ScannerView, EdgesGiveMixedPoints) {
   noise.beam_mm = 3;
   int between = 0, lines = 0;
   for (double deg = -3; deg < 3; deg += 0.05, ++lines) {
-    const ScannerView view{world, above(1800), [&](TimePoint) { return Angle::deg(deg); }, noise};
+    const ScannerView view{world, on_pivot(above(1800), [&](TimePoint) { return Angle::deg(deg); }), noise};
     const ScanLine line = view(kNow, Angle::deg(80), Angle::deg(0.25), 80);
     for (std::size_t i = 0; i < 80; ++i) {
       const double z = point_of(above(1800), Angle::deg(deg), Angle::deg(80 + 0.25 * static_cast<double>(i)),
@@ -134,19 +134,18 @@ TEST(ScannerView, EdgesGiveMixedPoints) {
 
 TEST(ScannerView, GrazingAndFarIsNoEcho) {
   const World world{{1000, 800, 0}};
-  const ScannerView steep{world, above(800), [](TimePoint) { return Angle::deg(88.5); }};
+  const ScannerView steep{world, on_pivot(above(800), [](TimePoint) { return Angle::deg(88.5); })};
   for (const float range : steep(kNow, Angle::deg(85), Angle::deg(1), 11).range_mm) EXPECT_TRUE(std::isnan(range));
-  const ScannerView far{world, above(3100), [](TimePoint) { return Angle{}; }};
+  const ScannerView far{world, on_pivot(above(3100), [](TimePoint) { return Angle{}; })};
   EXPECT_TRUE(std::isnan(far(kNow, Angle::deg(90), Angle::deg(1), 1).range_mm[0]));
-  const ScannerView close{world, above(600), [](TimePoint) { return Angle{}; }};
+  const ScannerView close{world, on_pivot(above(600), [](TimePoint) { return Angle{}; })};
   EXPECT_TRUE(std::isnan(close(kNow, Angle::deg(90), Angle::deg(1), 1).range_mm[0]));
 }
 
 TEST(ScannerView, WeakEchoesAreLostInRuns) {
   const World world{{1000, 800, 0}};
   // Light 0.05: about half of the echoes are lost.
-  const ScannerView view{world, above(200), [](TimePoint) { return Angle::deg(86.8); },
-                         [] {
+  const ScannerView view{world, on_pivot(above(200), [](TimePoint) { return Angle::deg(86.8); }), [] {
                            RangeNoise noise;
                            noise.range_max_mm = 20000;
                            return noise;
@@ -171,7 +170,7 @@ TEST(ScannerView, BiasIsConstantPerPart) {
   world.add("block", std::make_shared<RayMesh>(box_mesh({300, 300, 100})), T);
   RangeNoise noise = RangeNoise::exact();
   noise.bias_mm = 4;
-  const ScannerView view{world, above(1800), [](TimePoint) { return Angle{}; }, noise};
+  const ScannerView view{world, on_pivot(above(1800), [](TimePoint) { return Angle{}; }), noise};
   const double on_block = static_cast<double>(view(kNow, Angle::deg(90), Angle::deg(1), 1).range_mm[0]) - 1700;
   const double again = static_cast<double>(view(kNow + 1s, Angle::deg(90), Angle::deg(1), 1).range_mm[0]) - 1700;
   EXPECT_NE(on_block, 0);
@@ -233,7 +232,7 @@ TEST(ScannerView, NoiseOnATableIsThatOfARealScan) {
   const ScannerPlace place = above(920);
   const Angle first = Angle::deg(55), step = Angle::deg(0.25);
   Angle pivot;
-  const ScannerView view{world, place, [&](TimePoint) { return pivot; }};
+  const ScannerView view{world, on_pivot(place, [&](TimePoint) { return pivot; })};
   std::vector<Vector3d> points;
   for (int k = 0; k * 0.175 < 60; ++k) {
     pivot = Angle::deg(k * 0.175);

@@ -1,0 +1,82 @@
+#include <gtest/gtest.h>
+#include <string>
+
+#include "tests/support/cell_file.hpp"
+#include "tests/support/emulated_cell.hpp"
+#include "tests/support/scenes.hpp"
+
+/// Every device of the trade's cells in every combination: each one whole pick, from the PLC's request to the robot's
+/// report, in virtual time.
+namespace binpick::support {
+namespace {
+struct Combination {
+  const char* scanner;
+  const char* word_order;  ///< The make of PLC: s7 or logix.
+  const char* robot;
+};
+
+struct Tolerance {
+  double mm, deg;
+};
+Tolerance tolerance_of(const Combination& c) {
+  return std::string{c.scanner} == "lms400" ? Tolerance{5, 3} : Tolerance{1, 1.5};
+}
+
+CellFile file_of(const Combination& c) {
+  CellFile file;
+  file.scanner = c.scanner;
+  file.word_order = c.word_order;
+  file.robot = c.robot;
+  file.parts = {file.scanner == "lms400" ? "track_link" : "contact_bridge"};
+  return file;
+}
+
+emulators::World scene_for(const Combination& c) {
+  return std::string{c.scanner} == "lms400" ? scene_of("track_link", 4, 11)
+                                            : scene_of("contact_bridge", 6, 11, kSmallBox_mm);
+}
+
+struct Matrix : testing::TestWithParam<Combination> {};
+}  // namespace
+
+TEST_P(Matrix, OneWholePick) {
+  EmulatedCell cell{test_folder().load(file_of(GetParam())), scene_for(GetParam()), 11};
+  std::optional<drivers::robot::Pick> grasped;
+  cell.robot.on_grasp = [&](const drivers::robot::Pick& pick) {
+    grasped = pick;
+    return true;
+  };
+  ASSERT_TRUE(cell.run_until_ready());
+  const auto result = cell.pick();
+  ASSERT_TRUE(result.has_value());
+  ASSERT_EQ(result->code, plc::ResultCode::PickFound);
+  ASSERT_TRUE(cell.run_until([&] { return cell.robot.picks_done() == 1; }));
+  ASSERT_TRUE(grasped.has_value());
+  EXPECT_EQ(grasped->pick_id, result->pick_id);
+  EXPECT_LT((grasped->T_base_grasp.iso.translation() - result->T_base_grasp.iso.translation()).norm(), 0.01);
+
+  const auto& seen = cell.results().back();
+  const auto& chosen = seen.report.detections[seen.choice.reachable.front().detection];
+  const auto error = error_to_nearest(cell.world, cell.cell().data().knowledge_bases.front(), chosen.T_supply_object);
+  const Tolerance tolerance = tolerance_of(GetParam());
+  EXPECT_LT(error.centroid_mm, tolerance.mm);
+  EXPECT_LT(Angle::rad(error.angle_rad).in_deg(), tolerance.deg);
+  RecordProperty("error_mm", std::to_string(error.centroid_mm));
+  RecordProperty("error_deg", std::to_string(Angle::rad(error.angle_rad).in_deg()));
+}
+
+namespace {
+std::vector<Combination> all() {
+  std::vector<Combination> combinations;
+  for (const char* scanner : {"lms400", "lps36"})
+    for (const char* robot : {"ur", "fanuc", "kawasaki"})
+      for (const char* word_order : {"s7", "logix"}) combinations.push_back({scanner, word_order, robot});
+  return combinations;
+}
+}  // namespace
+
+INSTANTIATE_TEST_SUITE_P(All, Matrix, testing::ValuesIn(all()), [](const auto& one) {
+  const Combination& c = one.param;
+  return std::string{c.scanner} + "_" + c.robot + "_" + c.word_order;
+});
+}  // namespace binpick::support
