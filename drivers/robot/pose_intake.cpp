@@ -43,8 +43,9 @@ void PoseIntake::on_pose(double sender_s, const std::optional<Transform<frame::B
   if (reading == RemoteClock::Reading::Jumped) {
     if (!is_first && state_ == PoseState::Streaming)
       return fail(PoseFailed::Why::ClockJumped,
-                  "the time stamps of the poses jumped; they are measured anew. If it comes again, look for a second "
-                  "program that sends poses, or for a network that holds telegrams back for seconds");
+                  "the time stamps of the poses do not fit the time that passed; they are measured anew. If it comes "
+                  "again, look for a clock that does not count in the unit that is sent, for a second program that "
+                  "sends poses, or for a network that holds telegrams back for seconds");
     BINPICK_LOG(Notice, "robot", "the robot's clock began anew");
   }
   if (reading == RemoteClock::Reading::Repeated) return;

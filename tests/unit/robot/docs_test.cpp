@@ -1,6 +1,8 @@
 #include <algorithm>
+#include <cstdio>
 #include <fstream>
 #include <gtest/gtest.h>
+#include <map>
 #include <regex>
 #include <set>
 #include <sstream>
@@ -9,6 +11,7 @@
 
 #include "base/rotation.hpp"
 #include "drivers/robot/codec.hpp"
+#include "drivers/robot/pose_stream.hpp"
 
 namespace binpick::drivers::robot {
 namespace {
@@ -142,22 +145,25 @@ TEST(RobotDocs, TheKarelProgramCutsTheColumnsThatAreSent) {
   expect_requests(page, "ask\\('([a-z]+) ?'", {"hello", "fetch", "done", "failed"});
 }
 
-TEST(RobotDocs, TheKarelProgramsNamesAreShortAndItsBlocksClosed) {
+TEST(RobotDocs, TheKarelProgramsNamesAreShortAndTheirBlocksClosed) {
   const std::string page = read_page("fanuc");
-  const std::size_t begin = page.find("PROGRAM bpcomm\n"), end = page.find("END bpcomm\n");
-  ASSERT_TRUE(begin != std::string::npos && end != std::string::npos);
-  std::string code = std::regex_replace(page.substr(begin, end - begin), std::regex{"--[^\n]*|'[^'\n]*'"}, "");
-  const std::regex name{"\\b[a-z][a-z_0-9]*\\b"};
-  for (std::sregex_iterator it{code.begin(), code.end(), name}, last; it != last; ++it)
-    EXPECT_LE(it->str().size(), 12U) << it->str();
-  const auto count = [&](const char* pattern) {
-    const std::regex regex{pattern};
-    return std::distance(std::sregex_iterator{code.begin(), code.end(), regex}, std::sregex_iterator{});
-  };
-  EXPECT_EQ(count("\\bTHEN\\b"), count("\\bENDIF\\b"));
-  EXPECT_EQ(count("\\bWHILE\\b"), count("\\bENDWHILE\\b"));
-  EXPECT_EQ(count("\\bFOR\\b"), count("\\bENDFOR\\b"));
-  EXPECT_EQ(count("\\bROUTINE\\b"), count("\\bEND [a-z_]+"));
+  for (const std::string program : {"bpcomm", "bppose"}) {
+    SCOPED_TRACE(program);
+    const std::size_t begin = page.find("PROGRAM " + program + "\n"), end = page.find("END " + program + "\n");
+    ASSERT_TRUE(begin != std::string::npos && end != std::string::npos);
+    const std::string code = std::regex_replace(page.substr(begin, end - begin), std::regex{"--[^\n]*|'[^'\n]*'"}, "");
+    const std::regex name{"\\b[a-z][a-z_0-9]*\\b"};
+    for (std::sregex_iterator it{code.begin(), code.end(), name}, last; it != last; ++it)
+      EXPECT_LE(it->str().size(), 12U) << it->str();
+    const auto count = [&](const char* pattern) {
+      const std::regex regex{pattern};
+      return std::distance(std::sregex_iterator{code.begin(), code.end(), regex}, std::sregex_iterator{});
+    };
+    EXPECT_EQ(count("\\bTHEN\\b"), count("\\bENDIF\\b"));
+    EXPECT_EQ(count("\\bWHILE\\b"), count("\\bENDWHILE\\b"));
+    EXPECT_EQ(count("\\bFOR\\b"), count("\\bENDFOR\\b"));
+    EXPECT_EQ(count("\\bROUTINE\\b"), count("\\bEND [a-z_]+"));
+  }
 }
 
 TEST(RobotDocs, TheTpProgramJumpsToLabelsThatAreThereAndIsNumberedThrough) {
@@ -187,23 +193,115 @@ TEST(RobotDocs, TheAsProgramTakesAsManyNumbersAsAreSent) {
 
 TEST(RobotDocs, TheAsProgramsOpenAndCloseTheirBlocksAndCallWhatIsThere) {
   const std::string page = read_page("kawasaki");
-  const std::size_t begin = page.find("\n.PROGRAM "), end = page.find("\n.REALS", begin);
-  ASSERT_TRUE(begin != std::string::npos && end != std::string::npos);
-  std::stringstream code{page.substr(begin, end - begin)};
-  std::set<std::string> programs, called;
-  int depth = 0;
-  for (std::string line; std::getline(code, line);) {
-    line = line.substr(0, line.find(';'));
-    std::smatch match;
-    if (std::regex_search(line, match, std::regex{"^\\.PROGRAM ([a-z.]+)\\("})) programs.insert(match[1]);
-    if (std::regex_search(line, match, std::regex{"^ *CALL ([a-z.]+)"})) called.insert(match[1]);
-    if (std::regex_search(line, std::regex{"^ *(IF .* THEN|WHILE .* DO|FOR .* TO .*) *$"})) ++depth;
-    if (std::regex_search(line, std::regex{"^ *END *$"})) --depth;
-    EXPECT_TRUE(!line.starts_with(".END") || depth == 0) << depth;
-    ASSERT_GE(depth, 0) << line;
+  std::size_t begin = 0;
+  for (const std::size_t expected : {10U, 3U}) {
+    begin = page.find("\n.PROGRAM ", begin);
+    const std::size_t end = page.find("\n.REALS", begin);
+    ASSERT_TRUE(begin != std::string::npos && end != std::string::npos);
+    std::stringstream code{page.substr(begin, end - begin)};
+    begin = end;
+    std::set<std::string> programs, called;
+    int depth = 0;
+    for (std::string line; std::getline(code, line);) {
+      line = line.substr(0, line.find(';'));
+      std::smatch match;
+      if (std::regex_search(line, match, std::regex{"^\\.PROGRAM ([a-z.]+)\\("})) programs.insert(match[1]);
+      if (std::regex_search(line, match, std::regex{"^ *CALL ([a-z.]+)"})) called.insert(match[1]);
+      if (std::regex_search(line, std::regex{"^ *(IF .* THEN|WHILE .* DO|FOR .* TO .*) *$"})) ++depth;
+      if (std::regex_search(line, std::regex{"^ *END *$"})) --depth;
+      EXPECT_TRUE(!line.starts_with(".END") || depth == 0) << depth;
+      ASSERT_GE(depth, 0) << line;
+    }
+    for (const std::string& name : called) EXPECT_TRUE(programs.contains(name)) << name;
+    for (const std::string& name : programs) EXPECT_LE(name.size(), 15U) << name;
+    EXPECT_EQ(programs.size(), expected);
   }
-  for (const std::string& name : called) EXPECT_TRUE(programs.contains(name)) << name;
-  for (const std::string& name : programs) EXPECT_LE(name.size(), 15U) << name;
-  EXPECT_EQ(programs.size(), 10U);
+}
+
+namespace {
+PoseLine pose_example() {
+  PoseLine line{17, 123456, Eigen::Isometry3d::Identity()};
+  line.T_base_sent.translation() = Eigen::Vector3d{1234.568, -250, 600};
+  line.T_base_sent.linear() = from_wpr_deg({175, -12, -100});
+  return line;
+}
+
+/// As the controllers write a number: blanks in front up to a width.
+std::string padded(double value, int width, int decimals) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%*.*f", width, decimals, value);
+  return text;
+}
+}  // namespace
+
+TEST(RobotDocs, TheExamplePoseLinesAreThoseOfTheCodec) {
+  for (const auto& [make, dialect] : {std::pair{"fanuc", Dialect::Fanuc}, std::pair{"kawasaki", Dialect::Kawasaki}}) {
+    const std::string page = read_page(make);
+    EXPECT_NE(page.find("\n\n" + as_block(encode(pose_example(), dialect)) + "\n"), std::string::npos) << make;
+    EXPECT_NE(page.find("0 … " + std::to_string(kPoseSequences - 1) + ", then 0 again"), std::string::npos) << make;
+    EXPECT_EQ(kPoseTimeWrap_ms, 1e7);
+    EXPECT_NE(page.find("ms, 0 … 9 999 999, then 0 again"), std::string::npos) << make;
+  }
+}
+
+TEST(RobotDocs, TheKarelProgramSendsPosesThatAreUnderstood) {
+  const std::string page = read_page("fanuc");
+  const std::size_t begin = page.find("ROUTINE send_pose"), end = page.find("END send_pose");
+  ASSERT_TRUE(begin != std::string::npos && end != std::string::npos);
+  const std::string code = page.substr(begin, end - begin);
+  EXPECT_NE(code.find("line = 'pose'\n"), std::string::npos);
+  EXPECT_NE(page.find("wrap_lines = " + std::to_string(kPoseSequences) + "\n"), std::string::npos);
+  EXPECT_EQ(numbers(page, "wrap_ticks = ([0-9]+)").at(0) * numbers(page, "tick_ms = ([0-9]+)").at(0), 10'000'000);
+  const std::regex added{
+      "  add_(int\\(number\\)|int\\(\\(ticks MOD wrap_ticks\\) \\* tick_ms\\)|real\\(pose\\.([xyzwpr]), ([34])\\))"};
+  const Eigen::Vector3d wpr = to_wpr_deg(pose_example().T_base_sent.linear());
+  const std::map<std::string, double> values{{"x", 1234.568}, {"y", -250},    {"z", 600},
+                                             {"w", wpr.x()},  {"p", wpr.y()}, {"r", wpr.z()}};
+  std::string line = "pose", order;
+  for (std::sregex_iterator it{code.begin(), code.end(), added}, last; it != last; ++it) {
+    const std::string axis = (*it)[2];
+    order += axis.empty() ? "i" : axis;
+    if (axis.empty())
+      line += " " + padded(order.size() == 1 ? 17 : 123456, 2, 0);
+    else
+      line += " " + (" " + padded(values.at(axis), 1, std::stoi((*it)[3])));
+  }
+  EXPECT_EQ(order, "iixyzwpr");
+  const auto read = decode_pose_line(line, Dialect::Fanuc);
+  ASSERT_TRUE(read.has_value()) << line << ": " << to_string(read.error());
+  EXPECT_EQ(read->time_ms, 123456);
+  EXPECT_TRUE(read->T_base_sent.isApprox(pose_example().T_base_sent, 1e-6));
+}
+
+TEST(RobotDocs, TheAsProgramSendsPosesThatAreUnderstood) {
+  const std::string page = read_page("kawasaki");
+  const std::size_t begin = page.find(".PROGRAM bppose.pc"), end = page.find(".END", begin);
+  ASSERT_TRUE(begin != std::string::npos && end != std::string::npos);
+  const std::string code = page.substr(begin, end - begin);
+  const auto number_width = numbers(code, "\\$ENCODE\\(/I([0-9]+), \\.number\\)");
+  const auto time_width = numbers(code, "\\$ENCODE\\(/F([0-9]+)\\.1, \\.time \\* 1000\\)");
+  const auto length_width = numbers(code, "\" \" \\+ \\$ENCODE\\(/F([0-9]+)\\.3, \\.p\\[\\.i\\]\\)");
+  const auto angle_width = numbers(code, "\" \" \\+ \\$ENCODE\\(/F([0-9]+)\\.4, \\.p\\[\\.i\\]\\)");
+  ASSERT_TRUE(number_width.size() == 1 && time_width.size() == 1 && length_width.size() == 1 &&
+              angle_width.size() == 1);
+  EXPECT_NE(code.find(".$out[1] = \"pose \" + "), std::string::npos);
+  EXPECT_NE(code.find("(.number + 1) MOD " + std::to_string(kPoseSequences)), std::string::npos);
+  EXPECT_NE(code.find("IF .time >= 10000 THEN"), std::string::npos);
+  const auto line = [&](double number, double time_ms, double length, const Eigen::Vector3d& angles) {
+    std::string text = "pose " + padded(number, number_width[0], 0) + padded(time_ms, time_width[0], 1);
+    for (int i = 0; i < 3; ++i) text += " " + padded(length, length_width[0], 3);
+    for (int i = 0; i < 3; ++i) text += " " + padded(angles[i], angle_width[0], 4);
+    return text;
+  };
+  const Eigen::Vector3d oat = to_oat_deg(pose_example().T_base_sent.linear());
+  const auto read = decode_pose_line(line(17, 123456, -250, oat), Dialect::Kawasaki);
+  ASSERT_TRUE(read.has_value());
+  EXPECT_EQ(read->time_ms, 123456);
+  EXPECT_TRUE(read->T_base_sent.linear().isApprox(pose_example().T_base_sent.linear(), 1e-5));
+  // The widest numbers fit their fields, and there is a blank between all of them.
+  const std::string widest = line(9999, 9'999'999.9, -99'998.999, {-180, -180, -180});
+  EXPECT_LE(widest.size(), kLineBytesMax);
+  EXPECT_EQ(widest.size(), line(0, 0, 0, {0, 0, 0}).size());
+  EXPECT_TRUE(decode_pose_line(widest, Dialect::Kawasaki).has_value());
 }
 }  // namespace binpick::drivers::robot
