@@ -41,7 +41,7 @@ void PoseIntake::on_pose(double sender_s, const std::optional<Transform<frame::B
                 "poses come, but their time stamps stand still; check the program that sends them, or restart the "
                 "robot's controller");
   if (reading == RemoteClock::Reading::Jumped) {
-    if (!is_first && state_ == PoseState::Streaming)
+    if (!is_first)
       return fail(PoseFailed::Why::ClockJumped,
                   "the time stamps of the poses do not fit the time that passed; they are measured anew. If it comes "
                   "again, look for a clock that does not count in the unit that is sent, for a second program that "

@@ -14,7 +14,7 @@ struct PoseSample {
   Transform<frame::Base, frame::Flange> T_base_flange;
 };
 
-/// Samples come from now on, and their times can be trusted.
+/// The robot's clock is known, and samples come from now on (of an arm without power: as soon as it has some).
 struct PoseReady {
   Duration uncertainty{0};  ///< Of the samples' times; the least delay of the network is in addition.
 };

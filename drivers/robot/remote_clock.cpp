@@ -17,8 +17,8 @@ constexpr double kStopped_s = 0.5;
 /// No message comes before it was sent. What comes earlier than the line by more than this (a new least delay comes
 /// earlier by a little) was stamped by another clock, or the first messages were very late ones.
 constexpr double kEarly_s = 0.01;
-/// A burst of delay ends; a clock that was set back stays late.
-constexpr double kLate_s = 0.02, kLateFor_s = 10;
+/// A burst of delay ends; a clock that was set back stays late. What comes first after a pause may well be late.
+constexpr double kLate_s = 0.02, kLateFor_s = 10, kPause_s = 1;
 }  // namespace
 
 void RemoteClock::restart() { *this = {}; }
@@ -27,7 +27,7 @@ void RemoteClock::begin(double sender_s, TimePoint arrival) {
   restart();
   begun_ = true;
   origin_s_ = last_s_ = sender_s;
-  origin_ = last_arrival_ = moved_at_ = fitted_at_ = arrival;
+  origin_ = last_arrival_ = moved_at_ = arrival;
   least_ = Arrival{};
 }
 
@@ -45,11 +45,15 @@ RemoteClock::Reading RemoteClock::add(double sender_s, TimePoint arrival) {
   }
   const Arrival a{sender_s - origin_s_, in_s(arrival - origin_) - (sender_s - origin_s_)};
   const double above_s = a.late_s - line_.at(a.at_s);
-  if (above_s < kLate_s) fitted_at_ = arrival;
+  const double silent_s = in_s(arrival - last_arrival_);
+  if (above_s < kLate_s)
+    late_since_.reset();
+  else if (!late_since_ || silent_s > kPause_s)
+    late_since_ = arrival;
   // After a silence of minutes nothing of what is known tells of now.
-  const bool was_silent = in_s(arrival - last_arrival_) > kSpan_s;
+  const bool was_silent = silent_s > kSpan_s;
   const bool is_early = above_s < -kEarly_s;
-  const bool is_late = in_s(arrival - fitted_at_) > kLateFor_s;
+  const bool is_late = late_since_ && in_s(arrival - *late_since_) > kLateFor_s;
   if (sender_s < last_s_ || was_silent || is_early || is_late) {
     const bool has_jumped = sender_s < last_s_ || (!was_silent && (is_late || settled()));
     begin(sender_s, arrival);

@@ -45,7 +45,7 @@ class RemoteClock {
   TimePoint last_arrival_;
   TimePoint moved_at_;  ///< Arrival of the last stamp that was another than the one before.
   bool stop_told_ = false;
-  TimePoint fitted_at_;  ///< Arrival of the last stamp that was not much too late.
+  std::optional<TimePoint> late_since_;  ///< Each stamp since then was much too late.
   double window_begin_s_ = 0;
   std::optional<Arrival> least_;    ///< Of the window under way.
   std::deque<Arrival> least_late_;  ///< Of the windows of the last minutes.

@@ -1,6 +1,7 @@
 #include "drivers/robot/rtde/session.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <utility>
 #include <vector>
@@ -98,6 +99,7 @@ struct Session::Impl {
   ControllerVersion version;
   Bytes received, output;
   TimePoint waiting_until;
+  Duration silence_max{0};
   bool has_values = false;  // of this connection
   int texts_logged = 0;
   std::string trouble;
@@ -125,7 +127,8 @@ struct Session::Impl {
   void ask_for_outputs(const std::vector<Field>& fields, TimePoint now) {
     recipe = fields;
     const double most_hz = version.major >= 5 ? kFrequency_hz : kFrequencyCb3_hz;
-    SetupOutputs setup{std::min(options.frequency_hz.value_or(most_hz), most_hz), {}};
+    SetupOutputs setup{std::clamp(options.frequency_hz.value_or(most_hz), 1.0, most_hz), {}};
+    silence_max = std::max<Duration>(options.silence_max, from_s(3 / setup.frequency_hz));
     for (const Field field : fields) setup.names.emplace_back(words_of(field).name);
     ask(Step::Outputs, setup, now);
   }
@@ -203,7 +206,7 @@ struct Session::Impl {
       return fail(Why::BadTelegram, to_string(sample.error()) +
                                         "; the connection is opened anew. If it stays, compare the controller's "
                                         "software version with the manual page");
-    waiting_until = now + options.silence_max;
+    waiting_until = now + silence_max;
     has_values = true;
     const std::string said = trouble_of(*sample);
     if (said != trouble) BINPICK_LOG(Notice, "robot", "%s", said.empty() ? "the arm is ready to move" : said.c_str());
@@ -271,7 +274,7 @@ void Session::on_deadline(TimePoint now) {
   const auto due = deadline();
   if (!due || now < *due) return;
   if (impl_->has_values)
-    return impl_->fail(Why::Silent, "no pose for " + std::to_string(impl_->options.silence_max.count()) +
+    return impl_->fail(Why::Silent, "no pose for " + std::to_string(std::lround(in_ms(impl_->silence_max))) +
                                         " ms; check the network and that the controller is on");
   impl_->fail(Why::NoReply, std::string("no answer to ") + words_for(impl_->step) + " within " +
                                 std::to_string(impl_->options.reply_timeout.count()) +

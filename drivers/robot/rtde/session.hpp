@@ -18,7 +18,7 @@ struct Options {
   /// program may change it while the robot scans.
   std::optional<Transform<frame::Flange, frame::Tcp>> T_flange_tcp{};
   std::chrono::milliseconds reply_timeout{1000};  ///< For each step of the handshake.
-  std::chrono::milliseconds silence_max{250};     ///< Without a pose while they should come.
+  std::chrono::milliseconds silence_max{250};     ///< Without a pose while they should come; at least three periods.
 };
 
 /// One connection: version, controller version, outputs, start, data. After any loss all of it again: a controller that

@@ -263,6 +263,25 @@ TEST_P(PoseStreamTest, AClockThatJumpsInTheMiddleIsAFault) {
   EXPECT_TRUE(stream.take_reopen());
 }
 
+TEST_P(PoseStreamTest, TwoProgramsThatSendAtOnceAreToldOnce) {
+  int lines_logged = 0;
+  log::set_sink([&](log::Level, std::string_view, std::string_view) { ++lines_logged; });
+  PoseStream stream{{.dialect = GetParam()}};
+  stream.on_connected(kLinkStart);
+  PoseLine line = example();
+  for (int i = 0; i < 200; ++i) {
+    line.sequence = static_cast<std::uint16_t>(i);
+    line.time_ms = 20 * i + (i % 2 == 0 ? 0 : 5000);
+    stream.on_bytes(as_bytes(encode(line, GetParam())), kLinkStart + i * 20ms);
+  }
+  EXPECT_EQ(stream.state(), PoseState::Offline);
+  const auto event = stream.take_event();
+  ASSERT_TRUE(event.has_value());
+  EXPECT_EQ(std::get<PoseFailed>(*event).why, Why::ClockJumped);
+  EXPECT_FALSE(stream.take_event().has_value());
+  EXPECT_LE(lines_logged, 2);
+}
+
 TEST_P(PoseStreamTest, ItDoesNotMatterHowTheLinesAreCut) {
   Link l = link();
   l.sender.faults.split_every_byte = true;

@@ -163,6 +163,15 @@ TEST(RemoteClock, AShorterSilenceChangesNothing) {
   EXPECT_LT(std::abs(error_ms(clock, sender, 160)), 1.0);
 }
 
+TEST(RemoteClock, ALateMessageAfterAPauseIsNoJump) {
+  RemoteClock clock;
+  Sender sender;
+  for (int k = 0; k < 1000; ++k) clock.add(sender.stamp(0.01 * k), sender.arrival(0.01 * k));
+  EXPECT_EQ(clock.add(sender.stamp(40), kStart + 40s + 300ms), Reading::Good) << "held back while the link came up";
+  EXPECT_TRUE(clock.settled());
+  EXPECT_LT(std::abs(error_ms(clock, sender, 40)), 1.0);
+}
+
 TEST(RemoteClock, StampsThatAreNoNumbersTeachNothing) {
   RemoteClock clock;
   EXPECT_EQ(clock.add(std::numeric_limits<double>::quiet_NaN(), kStart), Reading::Jumped);

@@ -80,6 +80,13 @@ TEST_F(RtdeSession, AsksOlderControllersForTheirRateAndForNoMoreThanWanted) {
   EXPECT_EQ(fast.sender.asked()->frequency_hz, 125);
 }
 
+TEST_F(RtdeSession, SlowSamplesAreNoSilence) {
+  Link l = link({.frequency_hz = 2});
+  l.run_for(30s);
+  EXPECT_TRUE(l.failed.empty());
+  EXPECT_EQ(l.ready.size(), 1U);
+}
+
 TEST_F(RtdeSession, AProgramMayChangeTheTcp) {
   Link l = link();
   l.run_for(8s);
