@@ -1,4 +1,12 @@
-# What the tests on a real kernel share. Sourced in the project's folder, by a script that has set `build` and `name`.
+# What the tests on a real kernel share. Sourced in the project's folder, by a script that has set `name`.
+
+build=build/release
+while [ $# -gt 0 ]; do
+  case $1 in
+    --build) build=${2:?a folder} && shift 2 ;;
+    *) echo "usage: $name [--build DIR]" >&2; exit 2 ;;
+  esac
+done
 
 say() { echo "$name: $*"; }
 
@@ -9,15 +17,18 @@ vm_prepare() {
   [ -e "$build/CMakeCache.txt" ] || cmake --preset release >/dev/null
 }
 
-# vm_fetch PACKAGE FOLDER: unpacked there, not installed; once.
+# vm_fetch FOLDER PACKAGE…: unpacked there, not installed; once.
 vm_fetch() {
-  [ -e "$work/$2/.done" ] && return
-  say "fetching $1"
-  rm -rf "${work:?}/$2" "$work/fetch" && mkdir -p "$work/$2" "$work/fetch"
-  (cd "$work/fetch" && apt-get download -qq "$1" 2>/dev/null)
-  dpkg -x "$work"/fetch/*.deb "$work/$2"
+  local into=$work/$1 archive
+  shift
+  [ -e "$into/.done" ] && return
+  say "fetching $*"
+  rm -rf "$into" "$work/fetch" && mkdir -p "$into" "$work/fetch"
+  (cd "$work/fetch" && apt-get download -qq "$@" 2>/dev/null) ||
+    { echo "$name: apt-get download $* failed: run apt-get update, check the network" >&2; exit 2; }
+  for archive in "$work"/fetch/*.deb; do dpkg -x "$archive" "$into"; done
   rm -rf "$work/fetch"
-  touch "$work/$2/.done"
+  touch "$into/.done"
 }
 
 # Sets `kernel_package`, `kernel_root` and `version`.
@@ -26,7 +37,7 @@ vm_fetch_kernel() {
   [ -n "$kernel_package" ] || { echo "$name: apt knows no linux-image-amd64: run apt-get update" >&2; exit 2; }
   kernel_root=$work/kernel-$kernel_package
   version=${kernel_package#linux-image-}
-  vm_fetch "$kernel_package" "kernel-$kernel_package"
+  vm_fetch "kernel-$kernel_package" "$kernel_package"
   [ -e "$kernel_root/lib/modules/$version/modules.dep" ] || /sbin/depmod -b "$kernel_root" "$version"
 }
 
@@ -59,16 +70,60 @@ vm_modules() {
   done
 }
 
-# vm_boot SECONDS_MAX ROOT QEMU_OPTION…: boots ROOT as the initial file system. What the VM prints is shown and kept; it is
-# over when the VM powers off. The line "VM-RESULT n" that it printed last is the result, in `result`; empty: none came.
+# vm_kernel_module FILE.c: built with the kernel's headers, as $work/module/FILE.ko.
+vm_kernel_module() {
+  local needs headers=$work/headers-$version
+  mapfile -t needs < <(apt-cache depends "linux-headers-$version" | sed -n 's/.*Depends: \(linux-headers-.*\|linux-kbuild-.*\)/\1/p')
+  vm_fetch "headers-$version" "linux-headers-$version" "${needs[@]}"
+  echo "include $(echo "$headers"/usr/src/*-common)/Makefile" >"$headers/usr/src/linux-headers-$version/Makefile"
+  rm -rf "$work/module" && mkdir "$work/module"
+  cp "$1" "$work/module/"
+  echo "obj-m := $(basename "$1" .c).o" >"$work/module/Makefile"
+  make -C "$headers/usr/src/linux-headers-$version" M="$work/module" modules >"$work/module/log" 2>&1 ||
+    { tail -30 "$work/module/log" >&2; exit 1; }
+}
+
+# vm_pack ROOT: as an initial file system, ROOT.cpio, that vm_boot boots.
+vm_pack() {
+  (cd "$1" && find . | cpio --quiet -o -H newc -R 0:0) >"$1.cpio"
+  : >"$1.console.txt"
+}
+
+vm=  # its process
+trap '[ -z "$vm" ] || kill -KILL "$vm" 2>/dev/null || true' EXIT
+
+# vm_boot SECONDS_MAX ROOT QEMU_OPTION…: boots ROOT.cpio. Its time is counted in its instructions, so that a busy machine makes it
+# slow but not late. Its processor has no AVX2, with which QEMU 7.2 computes wrongly.
+# What the VM prints is shown, and kept in ROOT.console.txt. It ends when
+# it powers off, after SECONDS_MAX, or by a power cut: the VM prints "VM-CUT words" and is killed at once; `cut` has the
+# words. `result` is n of the line "VM-RESULT n" that it printed last. Empty: there was no such line.
 vm_boot() {
-  local seconds=$1 from=$2 begin=$SECONDS
+  local from=$2 begin=$SECONDS left=$1 until=$((SECONDS + $1)) line code
   shift 2
-  (cd "$from" && find . | cpio --quiet -o -H newc -R 0:0) >"$from.cpio"
+  result='' cut=''
   say "booting $kernel_package"
-  timeout "$seconds" qemu-system-x86_64 -accel tcg -cpu max -smp 1 -nographic -no-reboot -nodefaults -serial stdio \
-    -kernel "$kernel_root/boot/vmlinuz-$version" -initrd "$from.cpio" "$@" \
-    </dev/null 2>&1 | sed -u 's/\r//g; s/\x1b\[[?0-9;]*[a-zA-Z]//g; s/\x1bc//g' | tee "$from.console.txt" || true
-  result=$(sed -n 's/^VM-RESULT //p' "$from.console.txt" | tail -1)
-  say "result ${result:-none (the VM did not come to its end)}; VM $((SECONDS - begin)) s, whole run $SECONDS s"
+  exec 7< <(exec qemu-system-x86_64 -accel tcg -icount shift=0 -cpu Nehalem -smp 1 \
+    -nographic -no-reboot -nodefaults -serial stdio \
+    -kernel "$kernel_root/boot/vmlinuz-$version" -initrd "$from.cpio" "$@" </dev/null 2>&1)
+  vm=$!
+  while [ "$left" -gt 0 ] && IFS= read -r -t "$left" -u 7 line; do
+    left=$((until - SECONDS))
+    line=${line//$'\r'/}
+    while [[ $line =~ $'\e'(\[[?0-9;]*[a-zA-Z]|c) ]]; do code=${BASH_REMATCH[0]} line=${line/"$code"/}; done
+    case $line in
+      VM-RESULT\ *) result=${line#VM-RESULT } ;;
+      VM-CUT\ *)
+        kill -KILL "$vm"
+        cut=${line#VM-CUT }
+        ;;
+    esac
+    printf '%s\n' "$line" | tee -a "$from.console.txt"
+    [ -z "$cut" ] || break
+  done
+  [ "$left" -gt 0 ] || say "the VM did not come to its end within its time, and is killed"
+  kill -KILL "$vm" 2>/dev/null || true
+  wait "$vm" 2>/dev/null || true
+  vm=
+  exec 7<&-
+  say "VM ${cut:+(its power was cut) }$((SECONDS - begin)) s"
 }
