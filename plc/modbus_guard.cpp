@@ -34,7 +34,7 @@ std::string to_string(const FrameError& error) {
     case FrameError::Kind::Length:
       return "length field " + std::to_string(error.value) + " is outside 2 … 254";
     case FrameError::Kind::TooMuch:
-      return "more than " + std::to_string(kPendingBytesMax) + " bytes of requests wait";
+      return "more than " + std::to_string(kPendingBytesMax) + " bytes wait";
   }
   return "?";
 }

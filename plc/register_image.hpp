@@ -4,12 +4,13 @@
 #include <span>
 
 #include "base/check.hpp"
+#include "plc/events.hpp"
+#include "plc/options.hpp"
 #include "plc/registers.hpp"
-#include "plc/session.hpp"
 #include "plc/words.hpp"
 
 namespace binpick::plc {
-/// The words of the map as libmodbus serves them, written by name and type.
+/// The words of the map, written by name and type.
 class RegisterImage {
  public:
   /// `words` are the map's, from offset 0 on; they outlive this.

@@ -39,7 +39,7 @@ void Plc::on_connected(TimePoint now) {
   sending_.clear();
   job_ = Job::None;
   reply_due_.reset();
-  start_job(Job::Read, now);  // the first look is at what the cell remembers
+  if (!is_server()) start_job(Job::Read, now);  // the first look is at what the cell remembers
 }
 
 void Plc::on_disconnected(TimePoint now) {
@@ -55,10 +55,23 @@ void Plc::on_disconnected(TimePoint now) {
 void Plc::restart() {
   step_ = Step::Idle;
   sequence_ = part_id_ = supply_id_ = result_ack_ = heartbeat_ = 0;
-  request_ = abort_ = reset_ = picking_ = read_once_ = false;
+  request_ = abort_ = reset_ = picking_ = read_once_ = told_ = shown_zero_ = false;
   wanted_.reset();
+  again_ = false;
   image_ = {};
   reopen();
+}
+
+std::array<std::uint16_t, plc::kRequestLength> Plc::request_words() const {
+  std::uint16_t control = 0;
+  const auto set = [&](bool on, std::uint16_t mask) {
+    control = static_cast<std::uint16_t>(control | (on ? mask : 0));
+  };
+  set(request_, plc::control::kRequest);
+  set(abort_, plc::control::kAbort);
+  set(reset_, plc::control::kReset);
+  set(robot_clear_ && !picking_, plc::control::kRobotClear);
+  return {heartbeat_, sequence_, part_id_, supply_id_, result_ack_, 0, 0, control};
 }
 
 void Plc::start_job(Job job, TimePoint now) {
@@ -76,23 +89,13 @@ void Plc::start_job(Job job, TimePoint now) {
     append_be<std::uint16_t>(frame, plc::kStatusLength + plc::kResultLength);
   } else {
     if (!faults.error_code) ++heartbeat_;
-    std::uint16_t control = 0;
-    const auto set = [&](bool on, std::uint16_t mask) {
-      control = static_cast<std::uint16_t>(control | (on ? mask : 0));
-    };
-    set(request_, plc::control::kRequest);
-    set(abort_, plc::control::kAbort);
-    set(reset_, plc::control::kReset);
-    set(robot_clear_ && !picking_, plc::control::kRobotClear);
     append_be<std::uint16_t>(frame, 7 + 2 * plc::kRequestLength);
     frame.push_back(std::byte{0xFF});
     frame.push_back(std::byte{kWriteMultiple});
     append_be<std::uint16_t>(frame, static_cast<std::uint16_t>(options_.base_address + plc::kRequestFirst));
     append_be<std::uint16_t>(frame, plc::kRequestLength);
     frame.push_back(std::byte{2 * plc::kRequestLength});
-    for (const std::uint16_t value :
-         {heartbeat_, sequence_, part_id_, supply_id_, result_ack_, std::uint16_t{0}, std::uint16_t{0}, control})
-      append_be(frame, value);
+    for (const std::uint16_t value : request_words()) append_be(frame, value);
   }
   reply_due_ = now + options_.reply_timeout + faults.delay;
   send(std::move(frame), now);
@@ -135,14 +138,16 @@ Bytes Plc::take_output() {
 bool Plc::take_reopen() { return std::exchange(reopen_, false); }
 
 std::optional<TimePoint> Plc::deadline() const {
-  if (!connected_) return std::nullopt;
-  std::optional<TimePoint> at = earlier(next_poll_, reply_due_);
+  if (!connected_ && !is_server()) return std::nullopt;
+  // A server's program runs whether anybody listens or not.
+  std::optional<TimePoint> at = earlier(is_server() ? next_poll_.value_or(now_) : next_poll_, reply_due_);
   if (!sending_.empty()) at = earlier(at, std::max(sending_.front().at, now_));
   return at;
 }
 
 void Plc::on_deadline(TimePoint now) {
   now_ = now;
+  if (is_server()) return scan(now);
   if (!connected_) return;
   if (reply_due_ && now >= *reply_due_) {
     reply_due_.reset();
@@ -173,6 +178,10 @@ void Plc::on_bytes(ByteView bytes, TimePoint now) {
     if (received_.size() < frame_bytes) return;
     const Bytes frame(received_.begin(), received_.begin() + static_cast<std::ptrdiff_t>(frame_bytes));
     received_.erase(received_.begin(), received_.begin() + static_cast<std::ptrdiff_t>(frame_bytes));
+    if (is_server()) {
+      serve(frame, now);
+      continue;
+    }
     // MB_CLIENT ignores an answer under another transaction number until its time-out.
     if (job_ == Job::None || read_be<std::uint16_t>(frame, 0) != transaction_) continue;
     on_reply(ByteView{frame}.subspan(7), now);
@@ -191,14 +200,18 @@ void Plc::on_reply(ByteView pdu, TimePoint now) {
   constexpr std::size_t kWords = plc::kStatusLength + plc::kResultLength;
   if (job == Job::Read && function == kReadHolding && pdu.size() == 2 + 2 * kWords) {
     for (std::size_t i = 0; i < kWords; ++i) image_[plc::kStatusFirst + i] = read_be<std::uint16_t>(pdu, 2 + 2 * i);
-    for (const auto alarm : alarms()) alarms_seen_.insert(alarm);
-    if (last_alarm() != plc::Alarm::None) alarms_seen_.insert(last_alarm());
+    heard_alarms();
     if (!read_once_) check_map();
     if (!faults.error_code) program(now);
     read_once_ = true;
   }
   // An exception answer (a second writer, most often) is tried again at the next poll.
   next_poll_ = now + options_.poll;
+}
+
+void Plc::heard_alarms() {
+  for (const auto alarm : alarms()) alarms_seen_.insert(alarm);
+  if (last_alarm() != plc::Alarm::None) alarms_seen_.insert(last_alarm());
 }
 
 void Plc::check_map() {
@@ -246,7 +259,7 @@ PlcResult Plc::decode_result() const {
 }
 
 void Plc::raise_request(std::uint16_t part_id, std::uint16_t supply_id) {
-  if (read_once_ && shown_zero_) {
+  if (may_raise()) {
     start_request(part_id, supply_id);
   } else {
     wanted_ = std::pair{part_id,
@@ -266,7 +279,14 @@ void Plc::start_request(std::uint16_t part_id, std::uint16_t supply_id) {
   step_since_ = now_;
 }
 
+bool Plc::may_raise() const {
+  // While ack stands, whoever reads the registers now and then may not have seen the last request fall.
+  return read_once_ && shown_zero_ && !(is_server() && acknowledged());
+}
+
 void Plc::repeat_request() {
+  again_ = !may_raise();
+  if (again_) return;
   result_ack_ = 0;
   request_ = true;
   step_ = Step::Raised;
@@ -292,7 +312,8 @@ void Plc::program(TimePoint now) {
     return;
   }
   if (!shown_zero_) return;  // a request that stands when the two meet is refused
-  if (wanted_) start_request(wanted_->first, wanted_->second);
+  if (wanted_ && may_raise()) start_request(wanted_->first, wanted_->second);
+  if (again_) repeat_request();
   if (abort_ && bit(plc::status::kAbortAck)) {
     abort_ = false;
     request_ = false;
@@ -346,7 +367,9 @@ void Plc::automatic(TimePoint now) {
     if (now - step_since_ >= options_.answer_timeout) abort_ = true;
     return;
   }
-  if (ready() && !fault() && !abort_ && !picking_ && now >= next_request_)
+  // An answer to what this program asked before it was restarted: nobody waits for it.
+  if (result_valid()) result_ack_ = word(plc::at("result_sequence"));
+  if (ready() && may_raise() && !fault() && !abort_ && !picking_ && now >= next_request_)
     start_request(options_.part_id, options_.supply_id);
 }
 

@@ -21,7 +21,9 @@ struct PlcOptions {
   plc::WordOrder word_order = plc::WordOrder::HighWordFirst;
   plc::PoseConvention pose_convention = plc::PoseConvention::UniversalRobots;
   std::uint16_t base_address = 0;
+  plc::LineRole cell_role = plc::LineRole::Server;     ///< What the cell is on the line; the PLC is the other.
   Duration poll = std::chrono::milliseconds(30);       ///< One write and one read per poll, as two MB_CLIENT jobs.
+  Duration scan = std::chrono::milliseconds(10);       ///< As a server: the program runs this often.
   Duration reply_timeout = std::chrono::seconds(2);    ///< MB_CLIENT's RCV_TIMEOUT; then it connects anew.
   Duration answer_timeout = std::chrono::seconds(40);  ///< Automatic: no answer to a request for this long: abort.
   bool automatic = false;                              ///< Requests pick after pick and resets faults by itself.
@@ -49,10 +51,12 @@ struct PlcResult {
   plc::CycleFigures figures;
 };
 
-/// A PLC as a Modbus/TCP client with a handshake program of its own: one request in flight, transaction numbers, write
-/// block and read block in turn, like MB_CLIENT. Encodes and decodes Modbus by itself; it shares only the register map.
-/// Faults: unplugged and silent say nothing; garbage corrupts requests; wrong_id sends protocol id 7; error_code puts
-/// the PLC into STOP (connected, reading, heartbeat still); delay, split_every_byte, disconnect_after_bytes as they
+/// A PLC with a handshake program of its own. As a Modbus/TCP client: one request in flight, transaction numbers, write
+/// block and read block in turn, like MB_CLIENT. As a server: one connection, the map in its holding registers, all of
+/// them writable, functions 3, 6 and 16, like MB_SERVER. Encodes and decodes Modbus by itself; it shares only the
+/// register map. Faults: unplugged and silent say nothing; garbage corrupts what it sends; wrong_id sends protocol id
+/// 7, as a server another transaction; error_code puts the PLC into STOP (connected, reading, heartbeat still), as a
+/// server it is the exception that everything is answered with; delay, split_every_byte, disconnect_after_bytes as they
 /// say.
 class Plc {
  public:
@@ -84,6 +88,7 @@ class Plc {
   bool hold_ack = false;      ///< Do not acknowledge the result by itself.
   Faults faults;
 
+  bool is_server() const { return options_.cell_role == plc::LineRole::Client; }
   bool connected() const { return connected_; }
   bool idle() const { return step_ == Step::Idle; }  ///< No request is under way.
   std::uint16_t sequence() const { return sequence_; }
@@ -121,11 +126,17 @@ class Plc {
   };
 
   bool bit(std::uint16_t mask) const { return (word(plc::at("status")) & mask) != 0; }
+  std::array<std::uint16_t, plc::kRequestLength> request_words() const;
+  void scan(TimePoint now);
+  void serve(ByteView adu, TimePoint now);
+  Bytes answer(std::uint8_t function, ByteView content);
+  void heard_alarms();
   void start_job(Job job, TimePoint now);
   void send(Bytes bytes, TimePoint now);
   void on_reply(ByteView pdu, TimePoint now);
   void program(TimePoint now);
   void automatic(TimePoint now);
+  bool may_raise() const;
   void start_request(std::uint16_t part_id, std::uint16_t supply_id);
   void check_map();
   PlcResult decode_result() const;
@@ -150,6 +161,8 @@ class Plc {
   std::uint16_t heartbeat_ = 0, sequence_ = 0, part_id_ = 0, supply_id_ = 0, result_ack_ = 0;
   bool request_ = false, abort_ = false, reset_ = false, robot_clear_ = true, picking_ = false;
   bool read_once_ = false, shown_zero_ = false;
+  bool again_ = false;  // the last request, once it may be raised
+  bool told_ = false;   // as a server: the cell has written its blocks
   std::uint16_t known_boot_ = 0;
   std::optional<std::pair<std::uint16_t, std::uint16_t>> wanted_;  // part, supply: raised once the block was read
   TimePoint step_since_{}, next_request_{}, next_reset_{};

@@ -9,12 +9,45 @@ namespace {
 using emulators::Plc;
 using emulators::PlcOptions;
 using test::hex;
-using test::options;
 using test::Pair;
 using namespace std::chrono_literals;
+
+/// The cell in both roles; the PLC is the other.
+struct EmulatedPlc : testing::TestWithParam<LineRole> {
+  static Options cell_options() { return GetParam() == LineRole::Client ? test::client_options() : test::options(); }
+};
+INSTANTIATE_TEST_SUITE_P(Roles, EmulatedPlc, testing::Values(LineRole::Server, LineRole::Client),
+                         [](const auto& tested) { return tested.param == LineRole::Client ? "Client" : "Server"; });
 }  // namespace
 
-TEST(EmulatedPlc, ItsFirstFramesByteForByte) {
+TEST(EmulatedPlcAsServer, ItsFirstAnswersByteForByte) {
+  PlcOptions o;
+  o.cell_role = LineRole::Client;
+  o.base_address = 0x0100;
+  Plc plc{o};
+  const TimePoint t{10s};
+  plc.on_connected(t);
+  const auto exchange = [&](const Bytes& frame) {
+    plc.on_bytes(frame, t);
+    return plc.take_output();
+  };
+  plc.on_deadline(t);  // one scan of its program: heartbeat 1, robot clear
+  EXPECT_EQ(exchange(hex({0, 5, 0, 0, 0, 6, 1, 3, 0x01, 0x00, 0, 8})),
+            hex({0, 5, 0, 0, 0, 19, 1, 3, 16, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 8}));
+  EXPECT_EQ(exchange(hex({0, 6, 0, 0, 0, 11, 1, 16, 0x01, 0x10, 0, 2, 4, 0, 30, 0, 4})),
+            hex({0, 6, 0, 0, 0, 6, 1, 16, 0x01, 0x10, 0, 2}));
+  EXPECT_EQ(plc.cell_state(), State::Detecting);
+  EXPECT_TRUE(plc.busy());
+  EXPECT_EQ(exchange(hex({0, 7, 0, 0, 0, 6, 1, 6, 0x01, 0x11, 0, 1})), hex({0, 7, 0, 0, 0, 6, 1, 6, 0x01, 0x11, 0, 1}));
+  EXPECT_TRUE(plc.ready());
+  // Past its area; a count of nothing; a function that it has not.
+  EXPECT_EQ(exchange(hex({0, 8, 0, 0, 0, 6, 1, 3, 0x01, 0x51, 0, 2})), hex({0, 8, 0, 0, 0, 3, 1, 0x83, 2}));
+  EXPECT_EQ(exchange(hex({0, 8, 0, 0, 0, 6, 1, 3, 0x00, 0xFF, 0, 2})), hex({0, 8, 0, 0, 0, 3, 1, 0x83, 2}));
+  EXPECT_EQ(exchange(hex({0, 9, 0, 0, 0, 6, 1, 3, 0x01, 0x00, 0, 0})), hex({0, 9, 0, 0, 0, 3, 1, 0x83, 3}));
+  EXPECT_EQ(exchange(hex({0, 9, 0, 0, 0, 6, 1, 8, 0, 0, 0, 0})), hex({0, 9, 0, 0, 0, 3, 1, 0x88, 1}));
+}
+
+TEST(EmulatedPlcAsClient, ItsFirstFramesByteForByte) {
   PlcOptions o;
   o.base_address = 0x0100;
   Plc plc{o};
@@ -41,10 +74,10 @@ TEST(EmulatedPlc, ItsFirstFramesByteForByte) {
   EXPECT_TRUE(plc.take_reopen());
 }
 
-TEST(EmulatedPlc, OnePickInBothWordOrdersAndEachConvention) {
+TEST_P(EmulatedPlc, OnePickInBothWordOrdersAndEachConvention) {
   for (const auto order : {WordOrder::HighWordFirst, WordOrder::LowWordFirst}) {
     for (const auto convention : {PoseConvention::UniversalRobots, PoseConvention::Fanuc, PoseConvention::Kawasaki}) {
-      Options cell = options();
+      Options cell = cell_options();
       cell.word_order = order;
       cell.pose_convention = convention;
       cell.base_address = 100;
@@ -74,19 +107,19 @@ TEST(EmulatedPlc, OnePickInBothWordOrdersAndEachConvention) {
   }
 }
 
-TEST(EmulatedPlc, AWrongWordOrderIsSeenInTheTestWords) {
+TEST_P(EmulatedPlc, AWrongWordOrderIsSeenInTheTestWords) {
   PlcOptions o;
   o.word_order = WordOrder::LowWordFirst;
-  Pair pair{options(), o};
+  Pair pair{cell_options(), o};
   pair.run_for(1s);
   EXPECT_EQ(pair.plc.map_problem(), "word order differs");
 }
 
-TEST(EmulatedPlc, AutomaticAsksPickAfterPick) {
+TEST_P(EmulatedPlc, AutomaticAsksPickAfterPick) {
   PlcOptions o;
   o.automatic = true;
   o.pick_time = 2s;
-  Pair pair{options(), o};
+  Pair pair{cell_options(), o};
   pair.run_for(60s);
   EXPECT_GE(pair.plc.results_read(), 15U);
   EXPECT_EQ(pair.plc.torn_reads(), 0U);
@@ -95,10 +128,10 @@ TEST(EmulatedPlc, AutomaticAsksPickAfterPick) {
   while (const auto result = pair.plc.take_result()) EXPECT_EQ(result->pick_id, ++n) << "each once, in order";
 }
 
-TEST(EmulatedPlc, AutomaticResetsAFaultAndGoesOn) {
+TEST_P(EmulatedPlc, AutomaticResetsAFaultAndGoesOn) {
   PlcOptions o;
   o.automatic = true;
-  Pair pair{options(), o};
+  Pair pair{cell_options(), o};
   ASSERT_TRUE(pair.run_until([&] { return pair.plc.busy(); }));
   pair.scan_done_at.reset();
   pair.session->fault(Alarm::ScannerNoProfiles, pair.now);
@@ -108,8 +141,8 @@ TEST(EmulatedPlc, AutomaticResetsAFaultAndGoesOn) {
   EXPECT_EQ(pair.resets, 1U);
 }
 
-TEST(EmulatedPlc, RetryByHandGetsTheSameAnswer) {
-  Pair pair{options()};
+TEST_P(EmulatedPlc, RetryByHandGetsTheSameAnswer) {
+  Pair pair{cell_options()};
   pair.plc.raise_request();
   ASSERT_TRUE(pair.run_until([&] { return pair.plc.results_read() == 1 && pair.plc.idle(); }));
   pair.plc.repeat_request();
@@ -118,8 +151,8 @@ TEST(EmulatedPlc, RetryByHandGetsTheSameAnswer) {
   EXPECT_EQ(pair.accepted.size(), 1U);
 }
 
-TEST(EmulatedPlc, AbortByHand) {
-  Pair pair{options()};
+TEST_P(EmulatedPlc, AbortByHand) {
+  Pair pair{cell_options()};
   pair.plc.raise_request();
   ASSERT_TRUE(pair.run_until([&] { return pair.plc.busy(); }));
   pair.plc.raise_abort();
@@ -128,7 +161,7 @@ TEST(EmulatedPlc, AbortByHand) {
   EXPECT_EQ(pair.plc.results_read(), 0U);
 }
 
-TEST(EmulatedPlc, EachFaultIsNoticedByTheCellAndOvercome) {
+TEST_P(EmulatedPlc, EachFaultIsNoticedByTheCellAndOvercome) {
   struct Case {
     const char* name;
     std::function<void(emulators::Faults&)> set;
@@ -140,7 +173,8 @@ TEST(EmulatedPlc, EachFaultIsNoticedByTheCellAndOvercome) {
            Case{"stop", [](auto& f) { f.error_code = 1; }, Alarm::PlcHeartbeatStopped},
            Case{"garbage", [](auto& f) { f.garbage = true; }, Alarm::PlcLost},
            Case{"wrong protocol id", [](auto& f) { f.wrong_id = true; }, Alarm::PlcLost},
-           Case{"delay", [](auto& f) { f.delay = 300ms; }, Alarm::None},
+           // Of each answer; a pick takes a dozen of them where the PLC is asked.
+           Case{"delay", [](auto& f) { f.delay = GetParam() == LineRole::Client ? 60ms : 300ms; }, Alarm::None},
            Case{"split", [](auto& f) { f.split_every_byte = true; }, Alarm::None},
            Case{"cut", [](auto& f) { f.disconnect_after_bytes = 33; }, Alarm::None},
        }) {
@@ -148,7 +182,7 @@ TEST(EmulatedPlc, EachFaultIsNoticedByTheCellAndOvercome) {
     const test::LogLines quiet;
     PlcOptions o;
     o.automatic = true;
-    Pair pair{options(), o};
+    Pair pair{cell_options(), o};
     ASSERT_TRUE(pair.run_until([&] { return pair.plc.results_read() == 2; }));
     c.set(pair.plc.faults);
     pair.run_for(5500ms);
@@ -171,14 +205,14 @@ TEST(EmulatedPlc, EachFaultIsNoticedByTheCellAndOvercome) {
 }
 
 /// Hours of both programs, with restarts of either side and pulled cables at random moments.
-TEST(EmulatedPlc, RestartsOfEitherSideLoseNothingAndRepeatNothing) {
+TEST_P(EmulatedPlc, RestartsOfEitherSideLoseNothingAndRepeatNothing) {
   const test::LogLines quiet;
   for (unsigned seed = 1; seed <= 5; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937 random{seed};
     PlcOptions o;
     o.automatic = true;
-    Pair pair{options(), o};
+    Pair pair{cell_options(), o};
     std::set<std::pair<std::uint16_t, std::uint16_t>> sweeps;  // boot, sequence
     for (int i = 0; i < 200; ++i) {
       pair.run_for(std::chrono::milliseconds(random() % 3000));

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <optional>
 
 #include "plc/session.hpp"
@@ -8,17 +9,20 @@
 #include "tests/unit/plc/rig.hpp"
 
 namespace binpick::plc::test {
-/// Session and emulated PLC joined in memory, in virtual time, with a cell that answers picks by itself: the scan takes
-/// 1 s, the detection 0.2 s.
+/// Session, in either role, and emulated PLC joined in memory, in virtual time, with a cell that answers picks by
+/// itself: the scan takes 1 s, the detection 0.2 s.
 class Pair {
  public:
   explicit Pair(const Options& cell_options, const emulators::PlcOptions& plc_options = {})
-      : plc{plc_options}, options_{cell_options}, session{std::make_unique<Session>(cell_options, boot_count_)} {
+      : plc{in_role(plc_options, cell_options)},
+        options_{cell_options},
+        session{std::make_unique<Session>(cell_options, boot_count_)} {
     session->set_not_ready(0, now);
   }
 
   void restart_cell() {
     disconnect();
+    published.clear();
     session = std::make_unique<Session>(options_, ++boot_count_);
     session->set_not_ready(0, now);
     scan_done_at.reset();
@@ -44,16 +48,26 @@ class Pair {
     return condition();
   }
 
+  void cut_line() { disconnect(); }
+  bool connected() const { return connected_; }
+
   TimePoint now{std::chrono::seconds(1000)};
   emulators::Plc plc;
 
  private:
+  static emulators::PlcOptions in_role(emulators::PlcOptions options, const Options& cell) {
+    options.cell_role = cell.role;
+    return options;
+  }
+  bool is_client() const { return options_.role == LineRole::Client; }
+
   Options options_;
   std::uint16_t boot_count_ = 1;
 
  public:
   std::unique_ptr<Session> session;
-  std::vector<std::uint16_t> accepted;  ///< Sequence numbers in order.
+  std::vector<std::uint16_t> accepted;               ///< Sequence numbers in order.
+  std::map<std::uint16_t, std::uint16_t> published;  ///< Pick ids by sequence number, since the cell's start.
   unsigned aborted = 0, resets = 0, lost = 0, back = 0;
   std::optional<TimePoint> scan_done_at, result_at;
   PickResult next_result = Rig::pick(1);
@@ -62,18 +76,20 @@ class Pair {
   void disconnect() {
     if (!connected_) return;
     connected_ = false;
-    session->on_closed(id_, now);
+    is_client() ? session->on_disconnected(now) : session->on_closed(id_, now);
     plc.on_disconnected(now);
     reconnect_at_ = now + std::chrono::milliseconds(200);
   }
 
   void step() {
     if (!connected_ && !plc.faults.unplugged && now >= reconnect_at_) {
-      connected_ = session->on_accept(++id_, "192.168.0.10", 4000, now);
-      if (connected_)
+      connected_ = is_client() || session->on_accept(++id_, "192.168.0.10", 4000, now);
+      if (connected_) {
         plc.on_connected(now);
-      else
+        if (is_client()) session->on_connected(now);
+      } else {
         reconnect_at_ = now + std::chrono::milliseconds(200);
+      }
     }
     if (const auto at = plc.deadline(); at && *at <= now) plc.on_deadline(now);
     if (const auto at = session->deadline(); at && *at <= now) session->on_deadline(now);
@@ -84,6 +100,7 @@ class Pair {
     }
     if (result_at && *result_at <= now) {
       result_at.reset();
+      published[running_] = next_result.pick_id;
       session->publish(next_result, now);
       ++next_result.pick_id;
     }
@@ -95,9 +112,14 @@ class Pair {
     while (any) {
       any = false;
       if (connected_) {
-        if (const Bytes to_cell = plc.take_output(); !to_cell.empty()) session->on_bytes(id_, to_cell, now), any = true;
-        if (const Bytes to_plc = session->take_output(id_); !to_plc.empty()) plc.on_bytes(to_plc, now), any = true;
-        if (session->wants_close(id_) || plc.take_reopen()) disconnect(), any = true;
+        if (const Bytes to_cell = plc.take_output(); !to_cell.empty()) {
+          is_client() ? session->on_bytes(to_cell, now) : session->on_bytes(id_, to_cell, now);
+          any = true;
+        }
+        const Bytes to_plc = is_client() ? session->take_output() : session->take_output(id_);
+        if (!to_plc.empty()) plc.on_bytes(to_plc, now), any = true;
+        const bool close = is_client() ? session->take_reopen() : session->wants_close(id_);
+        if (close || plc.take_reopen()) disconnect(), any = true;
       }
       while (const auto event = session->take_event()) on(*event), any = true;
     }
@@ -106,6 +128,7 @@ class Pair {
   void on(const Event& event) {
     if (const auto* request = std::get_if<RequestAccepted>(&event)) {
       accepted.push_back(request->request.sequence);
+      running_ = request->request.sequence;
       scan_done_at = now + std::chrono::seconds(1);
       next_result.part_id = request->request.part_id;
     }
@@ -119,6 +142,7 @@ class Pair {
     back += std::holds_alternative<PlcBack>(event);
   }
 
+  std::uint16_t running_ = 0;  // the last one accepted
   ConnectionId id_ = 0;
   bool connected_ = false;
   TimePoint reconnect_at_{};

@@ -27,6 +27,14 @@ inline Options options() {
   return o;
 }
 
+/// The same for a cell that is the client of the PLC's server.
+inline Options client_options() {
+  Options o = options();
+  o.role = LineRole::Client;
+  o.address = "192.168.0.10:502";
+  return o;
+}
+
 class Rig {
  public:
   explicit Rig(const Options& o = options(), std::uint16_t boot_count = 7) : session{o, boot_count} {
