@@ -59,7 +59,7 @@ enum class ScannerModel { Lms400, Lps36, Lps36Hi };
 struct Config {
   std::string path;
   std::string name;
-  std::string plc_listen;  ///< "host:port".
+  std::string plc_listen;  ///< "host:port"; plc.address in the role of a client.
   plc::Options plc;
   std::string pivot_can;                    ///< "can0" or "cannelloni://HOST:PORT".
   std::uint16_t pivot_can_listen_port = 0;  ///< Local UDP port for cannelloni, 0: any.
@@ -83,6 +83,11 @@ struct Config {
   Detection detection;
   std::string picture_dir;  ///< A PNG per cycle goes here; empty: none.
   std::string state_dir;    ///< boot_count lives here.
+
+  /// Where the PLC is, as `plc.role` says: where it connects to, or where it is asked.
+  const std::string& plc_line() const { return plc.role == plc::LineRole::Client ? plc.address : plc_listen; }
+  /// Held by a daemon in the role of a client (base/lock_file.hpp).
+  std::string lock_path() const { return state_dir.empty() ? "" : state_dir + "/lock"; }
 };
 
 /// One finding, in the form file:line:col: message, the line, a caret, the remedy.

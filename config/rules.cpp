@@ -92,7 +92,20 @@ void check_servers(const Config& c, const CellPlaces& at, Findings& findings) {
                      " is not shorter than plc.detect_timeout_ms = " + ms(c.plc.detect_timeout) +
                      "; use less, or a longer time-out");
   }
-  const std::string port = port_of(c.plc_listen);
+  const bool polls = c.plc.role == plc::LineRole::Client;
+  if (polls && c.plc.address.empty())
+    findings.add(at.of("plc", "role"),
+                 "plc.role is \"client\", but where the PLC's Modbus server is does not stand there; write address = "
+                 "\"192.168.0.10:502\" below");
+  if (polls && at.given("plc", "listen"))
+    findings.add(at.of("plc", "listen"),
+                 "plc.listen is for the role server, but plc.role is \"client\" and nobody connects here; remove it");
+  if (!polls && !c.plc.address.empty())
+    findings.add(
+        at.of("plc", "address"),
+        "plc.address is for the role client, but plc.role is \"server\"; remove it, or write role = \"client\" "
+        "and remove listen");
+  const std::string port = polls ? "0" : port_of(c.plc_listen);
   if (!c.robot_listen.empty() && port != "0" && port == port_of(c.robot_listen))
     findings.add(at.of("robot", "listen"),
                  "robot.listen has the same port as plc.listen, " + port + "; use another, such as 5002");

@@ -212,6 +212,7 @@ the fixed axes x, then y, then z, in degrees. `T_a_b` maps coordinates in b to c
 - `pivot.can_listen_port` is for cannelloni only.
 - `detection.deadline_ms` is shorter than `plc.detect_timeout_ms`.
 - `plc.heartbeat_timeout_ms` is 0 or at least 100.
+- `plc.role = "client"` needs `plc.address` and takes no `plc.listen`; `"server"` takes no `plc.address`.
 - `plc.listen` and `robot.listen` differ in their port.
 - A sweep covers at least 1 degree, takes less than `plc.scan_timeout_ms` and gives at least 20 profiles.
 - In the middle of a sweep the scanner's middle ray goes down into the supply, or at most half its size beside it.

@@ -139,7 +139,7 @@ void Cell::shut_down(TimePoint now) {
 }
 
 bool Cell::safe() const {
-  return state_ == CellState::Idle && pivot_.state() != drivers::pivot::Session::State::Moving;
+  return state_ == CellState::Idle && pivot_.state() != drivers::pivot::Session::State::Moving && plc_.told();
 }
 
 void Cell::update_ready(TimePoint now) {

@@ -48,7 +48,7 @@ class Cell {
 
   /// Ends the cycle, stops the pivot, withdraws everything valid. Nothing is accepted any more.
   void shut_down(TimePoint now);
-  /// After shut_down: the pivot stands (or is not there), nothing valid is left.
+  /// After shut_down: the pivot stands (or is not there), nothing valid is left, and a PLC that is asked knows it.
   bool safe() const;
 
   CellState state() const { return state_; }

@@ -1,6 +1,7 @@
 #include "daemon/links.hpp"
 
 #include <stdexcept>
+#include <utility>
 
 #include "base/log.hpp"
 #include "base/peer_address.hpp"
@@ -27,6 +28,15 @@ link::ServerPeer plc_peer(Cell& cell) {
   };
 }
 
+link::StreamPeer plc_server_of(Cell& cell) {
+  return {
+      .on_connected = [&cell](TimePoint now) { cell.plc().on_connected(now); },
+      .on_bytes = [&cell](ByteView bytes, TimePoint now) { cell.plc().on_bytes(bytes, now); },
+      .on_disconnected = [&cell](TimePoint now) { cell.plc().on_disconnected(now); },
+      .take_output = [&cell] { return cell.plc().take_output(); },
+  };
+}
+
 std::unique_ptr<link::CanLink> open_pivot(link::Loop& loop, Cell& cell) {
   const auto& config = cell.data().config;
   const std::uint32_t module = config.pivot.module_id;
@@ -44,10 +54,10 @@ std::unique_ptr<link::CanLink> open_pivot(link::Loop& loop, Cell& cell) {
 
 Links::Links(link::Loop& loop, Cell& cell)
     : cell_{cell},
-      plc_{loop, endpoint(cell.data().config.plc_listen, "plc.listen"), plc_peer(cell)},
       pivot_{open_pivot(loop, cell)},
       scanner_{drivers::scanner::open_link(loop, cell.data().config.scanner_address,
                                            cell.data().config.scanner_listen_port, cell.scanner())} {
+  open_plc(loop);
   if (cell.data().config.robot_listen.empty()) return;  // the PLC forwards the movement
   robot_.emplace(
       loop, endpoint(cell.data().config.robot_listen, "robot.listen"),
@@ -81,20 +91,41 @@ Links::Links(link::Loop& loop, Cell& cell)
       link::TcpServerOptions{.connections_max = 2, .newest_wins = true});
 }
 
+void Links::open_plc(link::Loop& loop) {
+  const auto& config = cell_.data().config;
+  if (config.plc.role == plc::LineRole::Client)
+    plc_client_.emplace(loop, endpoint(config.plc.address, "plc.address"), plc_server_of(cell_));
+  else
+    plc_server_.emplace(loop, endpoint(config.plc_listen, "plc.listen"), plc_peer(cell_));
+}
+
 void Links::on_deadline(TimePoint now) {
   const auto due = [&](std::optional<TimePoint> at) { return at && *at <= now; };
   if (due(pivot_->deadline())) pivot_->on_deadline(now);
   if (due(scanner_->deadline())) scanner_->on_deadline(now);
+  if (!plc_client_) return;
+  if (due(plc_client_->deadline())) plc_client_->on_deadline(now);
+  // Attempts fail alike: told when the reason changes. Why an open connection ended, the session tells.
+  const bool connected = plc_client_->connected();
+  const bool closed = std::exchange(plc_connected_, connected) && !connected;
+  const std::string trouble = connected ? "" : plc_client_->last_error();
+  if (std::exchange(plc_trouble_, trouble) == trouble || trouble.empty() || closed) return;
+  BINPICK_LOG(Warning, "plc", "no connection to %s: %s", cell_.data().config.plc.address.c_str(), trouble.c_str());
 }
 
-std::optional<TimePoint> Links::deadline() const { return earlier(pivot_->deadline(), scanner_->deadline()); }
+std::optional<TimePoint> Links::deadline() const {
+  return earlier(earlier(pivot_->deadline(), scanner_->deadline()),
+                 plc_client_ ? plc_client_->deadline() : std::nullopt);
+}
 
 void Links::flush(TimePoint now) {
   if (cell_.scanner().take_reopen()) scanner_->reopen(now);
   if (robot_ && cell_.robot().take_reopen() && robot_connection_ != 0) robot_->close(robot_connection_, now);
+  if (plc_client_ && cell_.plc().take_reopen()) plc_client_->reopen(now);
   pivot_->flush(now);
   scanner_->flush(now);
-  plc_.flush(now);
+  if (plc_server_) plc_server_->flush(now);
+  if (plc_client_) plc_client_->flush(now);
   if (robot_) robot_->flush(now);
 }
 }  // namespace binpick::daemon

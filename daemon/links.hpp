@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "base/clock.hpp"
 #include "daemon/cell.hpp"
@@ -21,8 +22,13 @@ class Links {
   void flush(TimePoint now);  ///< After Cell::run: sends what the sessions have to say.
 
  private:
+  void open_plc(drivers::link::Loop& loop);
+
   Cell& cell_;
-  drivers::link::TcpServer plc_;
+  std::optional<drivers::link::TcpServer> plc_server_;  // one of the two, as plc.role says
+  std::optional<drivers::link::TcpClient> plc_client_;
+  bool plc_connected_ = false;  // as last seen
+  std::string plc_trouble_;     // why not
   std::unique_ptr<drivers::link::CanLink> pivot_;
   std::unique_ptr<drivers::link::DeviceLink> scanner_;
   std::optional<drivers::link::TcpServer> robot_;

@@ -1,5 +1,6 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <optional>
 #include <signal.h>
 #include <string>
 #include <sys/epoll.h>
@@ -8,6 +9,7 @@
 #include <unistd.h>
 
 #include "base/clock.hpp"
+#include "base/lock_file.hpp"
 #include "base/log.hpp"
 #include "daemon/boot_count.hpp"
 #include "daemon/cell.hpp"
@@ -64,7 +66,19 @@ int run(const std::string& path) {
     return kExitConfig;
   }
   const SystemClock clock;
-  Cell cell{*loaded, next_boot_count((*loaded)->config.state_dir)};
+  const std::uint16_t boot_count = next_boot_count((*loaded)->config.state_dir);
+  // Where the PLC is asked, no port in use tells a second daemon, or binpick, that one is at work.
+  std::optional<LockFile> lock;
+  if ((*loaded)->config.plc.role == plc::LineRole::Client) {
+    lock.emplace((*loaded)->config.lock_path());
+    if (lock->held_by_another()) {
+      BINPICK_LOG(Error, "daemon",
+                  "another binpickd is at work with %s; end it, or give this one its own cell.state_dir",
+                  (*loaded)->config.lock_path().c_str());
+      return 1;
+    }
+  }
+  Cell cell{*loaded, boot_count};
   drivers::link::Loop loop;
   Links links{loop, cell};
   VisionWorker worker{[&loop] { loop.wake(); }};
@@ -87,7 +101,7 @@ int run(const std::string& path) {
     }
   });
   BINPICK_LOG(Notice, "daemon", "%s is up: PLC at %s, pivot %s, scanner %s, robot at %s",
-              (*loaded)->config.name.c_str(), (*loaded)->config.plc_listen.c_str(), (*loaded)->config.pivot_can.c_str(),
+              (*loaded)->config.name.c_str(), (*loaded)->config.plc_line().c_str(), (*loaded)->config.pivot_can.c_str(),
               (*loaded)->config.scanner_address.c_str(), (*loaded)->config.robot_listen.c_str());
   sd_notify(0, "READY=1\nSTATUS=running");
 

@@ -12,7 +12,7 @@ namespace {
 /// What a good cell file says, in a few lines; and what is still to be done before it can pick.
 void print_summary(const config::Config& cell) {
   std::printf("%s: good\n", cell.path.c_str());
-  std::printf("  cell     %s, PLC at %s, %s\n", cell.name.c_str(), cell.plc_listen.c_str(),
+  std::printf("  cell     %s, PLC at %s, %s\n", cell.name.c_str(), cell.plc_line().c_str(),
               cell.robot_listen.empty() ? "no robot socket" : ("robot at " + cell.robot_listen).c_str());
   std::printf("  devices  pivot %u on %s, LMS 400 at %s\n", cell.pivot.module_id, cell.pivot_can.c_str(),
               cell.scanner_address.c_str());

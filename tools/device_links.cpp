@@ -3,6 +3,7 @@
 #include <chrono>
 #include <stdexcept>
 
+#include "base/lock_file.hpp"
 #include "drivers/scanner/any/scanner_link.hpp"
 
 namespace binpick::tools {
@@ -16,6 +17,8 @@ drivers::pivot::Options pivot_options(const config::Config& config, bool may_mov
 }  // namespace
 
 bool daemon_runs(const config::Config& config) {
+  // A daemon that asks the PLC listens nowhere.
+  if (config.plc.role == plc::LineRole::Client) return LockFile::is_held(config.lock_path());
   auto endpoint = link::parse_endpoint(config.plc_listen);
   if (!endpoint) return false;
   if (endpoint->host.empty() || endpoint->host == "0.0.0.0") endpoint->host = "127.0.0.1";

@@ -14,7 +14,8 @@
 #include "drivers/scanner/any/scanner.hpp"
 
 namespace binpick::tools {
-/// Whether somebody answers at the cell's PLC address: binpickd is at work then, and holds pivot and scanner.
+/// Whether binpickd is at work, and holds pivot and scanner: somebody answers where the PLC connects to, or, in the
+/// role of a client, the lock in cell.state_dir is held.
 bool daemon_runs(const config::Config& config);
 
 /// Pivot and scanner of a cell file on their real links, for commands that need the devices and not the daemon. The two

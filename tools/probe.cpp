@@ -11,6 +11,7 @@
 #include "drivers/pivot/state_word.hpp"
 #include "tools/commands.hpp"
 #include "tools/device_links.hpp"
+#include "tools/plc_probe.hpp"
 
 /// binpick probe CELL.toml: reaches each configured device and says what it is, without moving anything.
 namespace binpick::tools {
@@ -52,7 +53,7 @@ int probe(const std::string& cell_path) {
   }
   if (daemon_runs(*config)) {
     std::fprintf(stderr, "binpick: binpickd is at work on %s and holds the devices; stop it before probing\n",
-                 config->plc_listen.c_str());
+                 config->plc_line().c_str());
     return 1;
   }
   DeviceLinks devices{*config, false};
@@ -105,9 +106,10 @@ int probe(const std::string& cell_path) {
     std::printf("robot    %s: %s\n", config->robot_listen.c_str(),
                 robot ? ("connects from " + *robot).c_str() : "no robot connects; start its program");
   }
-  std::printf("plc      %s: free; the PLC is the client and connects when the daemon runs\n",
-              config->plc_listen.c_str());
-  return pivot_good && scanner_good && robot_good ? 0 : 1;
+  PlcAnswer plc{true, "free; the PLC is the client and connects when the daemon runs"};
+  if (config->plc.role == plc::LineRole::Client) plc = ask_plc(devices.loop(), *config);
+  std::printf("plc      %s: %s\n", config->plc_line().c_str(), plc.text.c_str());
+  return pivot_good && scanner_good && robot_good && plc.good ? 0 : 1;
 }
 }  // namespace
 

@@ -72,7 +72,7 @@ int scan(const std::string& cell_path, const std::string& out_path, int supply_i
   }
   if (daemon_runs(*config)) {
     std::fprintf(stderr, "binpick: binpickd is at work on %s and holds the devices; stop it before scanning\n",
-                 config->plc_listen.c_str());
+                 config->plc_line().c_str());
     return 1;
   }
 

@@ -16,12 +16,14 @@ using namespace std::chrono_literals;
 struct Makes {
   const char* word_order;
   const char* robot;
+  const char* plc_role = "server";  ///< What the daemon is.
 };
 
 CellFile with(const Makes& makes) {
   CellFile file;
   file.word_order = makes.word_order;
   file.robot = makes.robot;
+  file.plc_role = makes.plc_role;
   return file;
 }
 
@@ -82,8 +84,12 @@ TEST_P(WholePick, FromThePlcsRequestToTheRobotsReport) {
 }
 INSTANTIATE_TEST_SUITE_P(EachMake, WholePick,
                          testing::Values(Makes{"s7", "ur"}, Makes{"logix", "ur"}, Makes{"s7", "fanuc"},
-                                         Makes{"logix", "kawasaki"}),
-                         [](const auto& each) { return std::string(each.param.word_order) + "_" + each.param.robot; });
+                                         Makes{"logix", "kawasaki"}, Makes{"s7", "ur", "client"},
+                                         Makes{"logix", "fanuc", "client"}),
+                         [](const auto& each) {
+                           return std::string(each.param.word_order) + "_" + each.param.robot + "_" +
+                                  each.param.plc_role;
+                         });
 
 TEST(Cycle, AScannerThatFallsSilentJustBeforeTheEndIsAFaultNotAnEmptySupply) {
   EmulatedCell cell{test_folder().load(coarse_cell()), empty_scene()};

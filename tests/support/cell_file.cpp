@@ -45,8 +45,9 @@ std::string to_toml(const CellFile& file) {
   const Layout layout = layout_of(file);
   std::ostringstream out;
   out << "[cell]\nname = \"test\"\nstate_dir = \"" << file.state_dir << "\"\npicture_dir = \"" << file.picture_dir
-      << "\"\n\n[plc]\nlisten = \"127.0.0.1:" << file.plc_port << "\"\nword_order = \"" << file.word_order
-      << "\"\npose_convention = \"" << file.robot << "\"\nallow = []\ndetect_timeout_ms = " << file.detect_timeout_ms
+      << "\"\n\n[plc]\nrole = \"" << file.plc_role << (file.plc_role == "client" ? "\"\naddress" : "\"\nlisten")
+      << " = \"127.0.0.1:" << file.plc_port << "\"\nword_order = \"" << file.word_order << "\"\npose_convention = \""
+      << file.robot << "\"\nallow = []\ndetect_timeout_ms = " << file.detect_timeout_ms
       << "\n\n[pivot]\ncan = \"cannelloni://127.0.0.1:" << file.can_port
       << "\"\ncan_listen_port = " << file.can_listen_port << "\nmodule_id = 12\nT_base_pivot = { xyz_mm = [1200, 0, "
       << layout.pivot_height_mm << "], rpy_deg = [0, 90, 0] }\n\n";

@@ -12,6 +12,7 @@ namespace binpick::support {
 struct CellFile {
   std::string scanner = "lms400";  ///< scanner.model; size and place of the supply and the sweep go with it.
   std::string word_order = "s7";
+  std::string plc_role = "server";                  ///< plc.role: what the daemon is.
   std::string robot = "ur";                         ///< robot.dialect and plc.pose_convention.
   std::vector<std::string> parts = {"track_link"};  ///< Example parts that the build has trained; ids 1, 2, ….
   double tilt_max_deg = 45;

@@ -9,6 +9,7 @@ emulators::PlcOptions plc_options(const config::Config& config) {
   options.word_order = config.plc.word_order;
   options.pose_convention = config.plc.pose_convention;
   options.base_address = config.plc.base_address;
+  options.cell_role = config.plc.role;
   return options;
 }
 
@@ -76,14 +77,23 @@ void EmulatedCell::kill_daemon() {
 }
 
 Wire EmulatedCell::plc_wire() {
-  return {{
-              .there = [this] { return cell_ != nullptr; },
-              .on_connected = [this](TimePoint t) { cell_->plc().on_accept(++plc_connection_, "127.0.0.1", 50000, t); },
-              .on_bytes = [this](ByteView b, TimePoint t) { cell_->plc().on_bytes(plc_connection_, b, t); },
-              .on_disconnected = [this](TimePoint t) { cell_->plc().on_closed(plc_connection_, t); },
-              .take_output = [this] { return cell_->plc().take_output(plc_connection_); },
-              .wants_close = [this] { return cell_->plc().wants_close(plc_connection_); },
-          },
+  const Wire::End as_server{
+      .there = [this] { return cell_ != nullptr; },
+      .on_connected = [this](TimePoint t) { cell_->plc().on_accept(++plc_connection_, "127.0.0.1", 50000, t); },
+      .on_bytes = [this](ByteView b, TimePoint t) { cell_->plc().on_bytes(plc_connection_, b, t); },
+      .on_disconnected = [this](TimePoint t) { cell_->plc().on_closed(plc_connection_, t); },
+      .take_output = [this] { return cell_->plc().take_output(plc_connection_); },
+      .wants_close = [this] { return cell_->plc().wants_close(plc_connection_); },
+  };
+  const Wire::End as_client{
+      .there = [this] { return cell_ != nullptr; },
+      .on_connected = [this](TimePoint t) { cell_->plc().on_connected(t); },
+      .on_bytes = [this](ByteView b, TimePoint t) { cell_->plc().on_bytes(b, t); },
+      .on_disconnected = [this](TimePoint t) { cell_->plc().on_disconnected(t); },
+      .take_output = [this] { return cell_->plc().take_output(); },
+      .wants_close = [this] { return cell_->plc().take_reopen(); },
+  };
+  return {plc.is_server() ? as_client : as_server,
           {
               .there = [this] { return !plc.faults.unplugged; },
               .on_connected = [this](TimePoint t) { plc.on_connected(t); },

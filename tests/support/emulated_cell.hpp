@@ -48,7 +48,8 @@ class EmulatedCell {
   bool run_until_ready(Duration limit = std::chrono::seconds(60));
   /// Requests a pick and waits for its answer (the PLC's result); nothing when none came in 30 s.
   std::optional<emulators::PlcResult> pick(std::uint16_t part_id = 1, std::uint16_t supply_id = 1);
-  /// A word from the PLC (FC6) that the daemon has read and not yet looked at: nothing runs in between.
+  /// A word from a PLC that is the client (FC6), that the daemon has read and not yet looked at: nothing runs in
+  /// between.
   void plc_writes(std::uint16_t offset, std::uint16_t value);
 
   /// The daemon's face; only while it runs.

@@ -29,6 +29,33 @@ TEST(Daemon, MakesAWholePick) {
   ASSERT_TRUE(cell.run_until([&] { return cell.robot().picks_done() == 1; }));
 }
 
+TEST(Daemon, PollsAPlcThatIsTheServerAndTellsItWhenItEnds) {
+  CellFile file = coarse_cell();
+  file.plc_role = "client";
+  SystemCell cell{file, scene_of("track_link", 3, 2)};
+  ASSERT_TRUE(cell.run_until_ready());
+  auto result = cell.pick();
+  ASSERT_TRUE(result.has_value());
+  EXPECT_EQ(result->code, plc::ResultCode::PickFound);
+  // A second one would ask the same PLC and hold the same devices.
+  const Ended second = run_program(BINPICKD_PROGRAM, {"--config", cell.cell_path()});
+  EXPECT_EQ(second.status, 1);
+  EXPECT_NE(second.errors.find("another binpickd is at work with "), std::string::npos) << second.errors;
+  cell.plc().faults.unplugged = true;
+  cell.run_for(500ms);
+  cell.plc().faults = {};
+  ASSERT_TRUE(cell.run_until([&] { return cell.plc().connected(); }, 5s));
+  ASSERT_TRUE(cell.run_until([&] { return cell.robot().picks_done() == 1 && cell.plc().ready(); }));
+  result = cell.pick();
+  ASSERT_TRUE(result.has_value());
+  EXPECT_NE(result->code, plc::ResultCode::None);
+  ASSERT_TRUE(cell.run_until([&] { return cell.plc().idle() && cell.plc().ready(); }));
+  cell.signal(SIGTERM);
+  ASSERT_TRUE(cell.run_until([&] { return cell.exit_status().has_value(); }, 2s));
+  EXPECT_EQ(cell.exit_status(), 0);
+  EXPECT_FALSE(cell.plc().ready());
+}
+
 TEST(Daemon, KilledInASweepThePivotStopsByItselfAndThePlcSeesTheRestart) {
   SystemCell cell{coarse_cell(), scene_of("track_link", 3, 2)};
   ASSERT_TRUE(cell.run_until_ready());

@@ -85,8 +85,10 @@ SystemCell::SystemCell(CellFile file, emulators::World scene) : file_{std::move(
       loop_, *config_, world_, emulators::on_pivot(place, [this](TimePoint at) { return pivot_->angle_at(at); }), 1);
   robot_ = std::make_unique<emulators::RobotPort>(loop_, *drivers::link::parse_endpoint(config_->robot_listen),
                                                   emulators::Robot{{.dialect = config_->robot.dialect}});
-  plc_ = std::make_unique<emulators::PlcPort>(loop_, *drivers::link::parse_endpoint(config_->plc_listen),
-                                              emulators::Plc{});
+  emulators::PlcOptions plc;
+  plc.cell_role = config_->plc.role;
+  plc_ = std::make_unique<emulators::PlcPort>(loop_, *drivers::link::parse_endpoint(config_->plc_line()),
+                                              emulators::Plc{plc});
   start_daemon();
 }
 

@@ -134,4 +134,41 @@ std::unique_ptr<ScannerPort> open_scanner(link::Loop& loop, const config::Config
   return std::make_unique<Lps36Port>(loop, config.scanner_address, Lps36View{world, std::move(where), device},
                                      Lps36::Options{.hi = is_hi, .seed = seed});
 }
+
+PlcPort::PlcPort(link::Loop& loop, const link::Endpoint& endpoint, Plc plc)
+    : ClientPort{loop, endpoint, std::move(plc)} {
+  if (!device.is_server()) return;
+  server_.emplace(
+      loop, endpoint,
+      link::ServerPeer{
+          .on_accept =
+              [this](link::ConnectionId id, const std::string&, std::uint16_t, TimePoint now) {
+                if (device.faults.unplugged) return false;
+                if (connection_ != 0) device.on_disconnected(now);
+                connection_ = id;
+                device.on_connected(now);
+                return true;
+              },
+          .on_bytes =
+              [this](link::ConnectionId id, ByteView bytes, TimePoint now) {
+                if (id == connection_) device.on_bytes(bytes, now);
+              },
+          .on_closed =
+              [this](link::ConnectionId id, TimePoint now) {
+                if (id != connection_) return;
+                connection_ = 0;
+                device.on_disconnected(now);
+              },
+          .take_output = [this](link::ConnectionId id) { return id == connection_ ? device.take_output() : Bytes{}; },
+          .wants_close = [this](link::ConnectionId id) { return id != connection_; },
+      },
+      link::TcpServerOptions{.connections_max = 2, .newest_wins = true});
+}
+
+void PlcPort::turn(TimePoint now) {
+  if (!server_) return ClientPort::turn(now);
+  if (device.deadline() && *device.deadline() <= now) device.on_deadline(now);
+  server_->flush(now);
+  if ((device.take_reopen() || device.faults.unplugged) && connection_ != 0) server_->close(connection_, now);
+}
 }  // namespace binpick::emulators

@@ -147,5 +147,16 @@ class ClientPort {
   std::unique_ptr<drivers::link::TcpClient> link_;
 };
 using RobotPort = ClientPort<Robot>;
-using PlcPort = ClientPort<Plc>;
+
+/// The PLC: a client of the daemon, or a server with one connection that the daemon opens.
+class PlcPort : public ClientPort<Plc> {
+ public:
+  /// `endpoint` is the daemon's, or where the PLC listens. Throws std::runtime_error when it cannot listen there.
+  PlcPort(drivers::link::Loop& loop, const drivers::link::Endpoint& endpoint, Plc plc);
+  void turn(TimePoint now);
+
+ private:
+  drivers::link::ConnectionId connection_ = 0;
+  std::optional<drivers::link::TcpServer> server_;
+};
 }  // namespace binpick::emulators

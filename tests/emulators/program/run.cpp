@@ -88,8 +88,12 @@ void Run::open_devices() {
     plc.word_order = config_.plc.word_order;
     plc.pose_convention = config_.plc.pose_convention;
     plc.base_address = config_.plc.base_address;
-    plc_ =
-        std::make_unique<PlcPort>(loop_, daemon_at(config_.plc_listen, options_.daemon_host, "plc.listen"), Plc{plc});
+    plc.cell_role = config_.plc.role;
+    const bool server = plc.cell_role == plc::LineRole::Client;
+    // A server listens where the cell file says that it is; a client looks for the daemon.
+    const link::Endpoint at = server ? daemon_at(config_.plc.address, "", "plc.address")
+                                     : daemon_at(config_.plc_listen, options_.daemon_host, "plc.listen");
+    plc_ = std::make_unique<PlcPort>(loop_, at, Plc{plc});
   }
 }
 
@@ -103,7 +107,9 @@ void Run::print_addresses() const {
   if (pivot_) say("pivot:   %s, module %u", config_.pivot_can.c_str(), config_.pivot.module_id);
   if (scanner_) say("scanner: listens at %s", config_.scanner_address.c_str());
   if (robot_) say("robot:   connects to the daemon's robot.listen, %s", config_.robot_listen.c_str());
-  if (plc_) say("PLC:     connects to the daemon's plc.listen, %s", config_.plc_listen.c_str());
+  if (plc_)
+    say(plc_->device.is_server() ? "PLC:     listens at %s" : "PLC:     connects to the daemon's plc.listen, %s",
+        config_.plc_line().c_str());
 }
 
 int Run::run() {

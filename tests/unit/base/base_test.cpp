@@ -5,6 +5,7 @@
 #include "base/bytes.hpp"
 #include "base/clock.hpp"
 #include "base/frames.hpp"
+#include "base/lock_file.hpp"
 #include "base/log.hpp"
 #include "base/peer_address.hpp"
 #include "base/units.hpp"
@@ -15,6 +16,21 @@ TEST(Units, AreNamedAtBothEnds) {
   EXPECT_DOUBLE_EQ(Length::mm(3).in_m(), 0.003);
   EXPECT_NEAR(Angle::deg(180).in_rad(), 3.14159265358979, 1e-14);
   EXPECT_LT(Angle::deg(1), Angle::rad(1));
+}
+
+TEST(LockFile, OneHoldsItAndOthersSeeIt) {
+  const std::string path = testing::TempDir() + "binpick-lock-test";
+  EXPECT_FALSE(LockFile::is_held(path));
+  {
+    const LockFile first{path};
+    EXPECT_FALSE(first.held_by_another());
+    EXPECT_TRUE(LockFile::is_held(path));
+    const LockFile second{path};
+    EXPECT_TRUE(second.held_by_another());
+  }
+  EXPECT_FALSE(LockFile::is_held(path)) << "whoever ends lets go";
+  const LockFile nowhere{"/nonexistent/lock"};
+  EXPECT_FALSE(nowhere.held_by_another());
 }
 
 TEST(Bytes, BothOrders) {

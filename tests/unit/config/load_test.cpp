@@ -138,6 +138,27 @@ tilt_max_deg = 30
   EXPECT_EQ(loaded->supplies[0].size_mm.z(), 100.5);
 }
 
+TEST(Load, TheRoleOnThePlcsLineAndItsAddressBelongTogether) {
+  CellFolder folder;
+  folder.edit("role = \"server\"", "role = \"client\"");
+  EXPECT_EQ(
+      folder.findings(),
+      std::to_string(folder.line_of("role = ")) +
+          ":8: plc.role is \"client\", but where the PLC's Modbus server is does not stand there; write address = "
+          "\"192.168.0.10:502\" below\n" +
+          std::to_string(folder.line_of("listen = \"0.0.0.0:502")) +
+          ":10: plc.listen is for the role server, but plc.role is \"client\" and nobody connects here; remove it\n");
+  folder.edit("listen = \"0.0.0.0:502\"", "").edit("address = \"\"", "address = \"192.168.0.10:502\"");
+  folder.edit("unit_id = 255", "unit_id = 1").edit("poll_ms = 20", "poll_ms = 50");
+  const auto loaded = folder.load();
+  ASSERT_TRUE(loaded.has_value()) << folder.findings();
+  EXPECT_EQ(loaded->plc.role, plc::LineRole::Client);
+  EXPECT_EQ(loaded->plc_line(), "192.168.0.10:502");
+  EXPECT_EQ(loaded->plc.unit_id, 1);
+  EXPECT_EQ(loaded->plc.poll, 50ms);
+  EXPECT_EQ(loaded->plc.reply_timeout, 1000ms);
+}
+
 struct Mistake {
   const char* from;
   const char* to;
@@ -182,13 +203,13 @@ INSTANTIATE_TEST_SUITE_P(
                 "scanner.exposure is for scanner.model = lps36, lps36hi only; remove it"},
         Mistake{"model = \"lms400\"\n", "", "[scanner]", 1,
                 "scanner.model is missing in [scanner]; add, for example: model = \"lms400\""},
-        Mistake{"address = \"192.168.0.1:2111\"", "address = \"192.168.0.1\"", "address", 11,
+        Mistake{"address = \"192.168.0.1:2111\"", "address = \"192.168.0.1\"", "address = \"192", 11,
                 "scanner.address = \"192.168.0.1\" has no port; write it as host:port"},
-        Mistake{"address = \"192.168.0.1:2111\"", "address = \"192.168.0.300:2111\"", "address", 11,
+        Mistake{"address = \"192.168.0.1:2111\"", "address = \"192.168.0.300:2111\"", "address = \"192", 11,
                 "scanner.address = \"192.168.0.300:2111\" has no valid IPv4 address; it has four numbers of 0 … 255"},
-        Mistake{"address = \"192.168.0.1:2111\"", "address = \"scanner:99999\"", "address", 11,
+        Mistake{"address = \"192.168.0.1:2111\"", "address = \"scanner:99999\"", "address = \"scanner", 11,
                 "scanner.address = \"scanner:99999\" has the port \"99999\"; give a number of 1 … 65535"},
-        Mistake{"address = \"192.168.0.1:2111\"", "address = \"fd00::1:2111\"", "address", 11,
+        Mistake{"address = \"192.168.0.1:2111\"", "address = \"fd00::1:2111\"", "address = \"fd00", 11,
                 "scanner.address = \"fd00::1:2111\" has a host with colons; put an IPv6 address in brackets, "
                 "[address]:port"},
         Mistake{"allow = [\"192.168.0.10\"]", "allow = [\"192.168.0.10\", \"plc1\"]", "allow", 26,
@@ -260,6 +281,9 @@ INSTANTIATE_TEST_SUITE_P(
             "plc.heartbeat_timeout_ms = 50 is shorter than a PLC's cycle may be; use 0 (not watched) or at least 100"},
         Mistake{"listen = \"0.0.0.0:5002\"", "listen = \"127.0.0.1:502\"", "listen = \"127", 10,
                 "robot.listen has the same port as plc.listen, 502; use another, such as 5002"},
+        Mistake{"address = \"\"", "address = \"192.168.0.10:502\"", "address = \"192.168.0.10", 11,
+                "plc.address is for the role client, but plc.role is \"server\"; remove it, or write role = \"client\" "
+                "and remove listen"},
         Mistake{"sweep_end_deg = 16", "sweep_end_deg = -16.5", "sweep_end_deg", 17,
                 "supply.sweep_end_deg is 0.5 deg from sweep_start_deg, that is no sweep; use at least 1"},
         Mistake{
