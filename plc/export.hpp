@@ -7,14 +7,15 @@
 #include <string>
 #include <vector>
 
-#include "plc/session.hpp"
+#include "plc/options.hpp"
 
 /// Sources for the PLC's engineering tool: register map and handshake as a program, made from the tables that the cell
 /// runs on (plc/registers.hpp, plc/handshake.hpp, plc/counterpart.hpp). Same options, same bytes; all of it is ASCII.
 namespace binpick::plc {
 struct ExportOptions {
+  LineRole role = LineRole::Server;                   ///< The cell's; the PLC is the other.
   std::array<std::uint8_t, 4> host{192, 168, 0, 20};  ///< The cell controller's IPv4 address, as the PLC sees it.
-  std::uint16_t port = 502;
+  std::uint16_t port = 502;                           ///< Of the server, the cell's or the PLC's.
   std::uint16_t base_address = 0;
   std::optional<PoseConvention> pose_convention;  ///< For the comments; the program reads the register.
   std::chrono::milliseconds poll{50};

@@ -51,12 +51,20 @@ struct Tag {
 
 std::vector<Tag> tags(const ExportOptions& options) {
   const std::string base = std::to_string(options.base_address);
+  const std::string answer = std::to_string(options.base_address + kStatusFirst);
+  const std::string request_words = std::to_string(kRequestLength),
+                    answer_words = std::to_string(kStatusLength + kResultLength);
+  const bool asked = options.role == LineRole::Client;
   std::vector<Tag> out{
       {"", std::string(kWriteArray), "INT", kRequestLength, "Decimal",
-       "Request block: function 16, address " + base + ", " + std::to_string(kRequestLength) + " words"},
+       "Request block: " +
+           (asked ? "copy to the server's holding registers from address " + base : "function 16, address " + base) +
+           ", " + request_words + " words"},
       {"", std::string(kReadArray), "INT", kStatusLength + kResultLength, "Decimal",
-       "Status and result: function 3, address " + std::to_string(options.base_address + kStatusFirst) + ", " +
-           std::to_string(kStatusLength + kResultLength) + " words"}};
+       "Status and result: " +
+           (asked ? "copy from the server's holding registers from address " + answer
+                  : "function 3, address " + answer) +
+           ", " + answer_words + " words"}};
   for (const Variable& v : program_variables()) {
     const bool elementary =
         v.kind == Variable::Kind::Bool || v.kind == Variable::Kind::Number || v.kind == Variable::Kind::Word;
@@ -74,7 +82,7 @@ std::string described(const std::string& help) {
 
 std::string data_type(const Block& block, bool target, const ExportOptions& options) {
   std::string out = "<DataType " + std::string(target ? "Use=\"Target\" " : "") + "Name=\"" + std::string(block.type) +
-                    "\" Family=\"NoFamily\" Class=\"User\">\n<Description>\n" + cdata(ascii(block.help)) +
+                    "\" Family=\"NoFamily\" Class=\"User\">\n<Description>\n" + cdata(ascii(help_of(block, options))) +
                     "\n</Description>\n<Members>\n";
   for (const Register& r : registers_of(block))
     out += "<Member Name=\"" + std::string(r.name) + "\" DataType=\"" + std::string(type_name(r.type)) +
@@ -111,7 +119,9 @@ std::string structured_text(const ExportOptions& options) {
   out +=
       "// 32-bit values: low word first; the cell file has plc.word_order = \"logix\".\n"
       "// A number of the map above 32767 reads negative here: add 65536.\n\n"
-      "// 0. The blocks: another program, the Modbus client, moves both arrays (see BinPick_Write, BinPick_Read).\n"
+      "// 0. The blocks: another program, the Modbus " +
+      std::string(options.role == LineRole::Client ? "server" : "client") +
+      ", moves both arrays (see BinPick_Write, BinPick_Read).\n"
       "CPS(" +
       read + "[0], status, 1);\nCPS(" + read + "[" + std::to_string(kStatusLength) + "], answer, 1);\n\n" +
       program_body(Dialect::Logix, options) + "\n// 6. What the Modbus client writes next.\nCPS(request, " + write +

@@ -66,9 +66,12 @@ constexpr std::array kVariables{
 };
 
 constexpr std::array kBlocks{
-    Block{"BinPick_Request", kRequestFirst, kRequestLength, "PLC to cell, written with one function 16"},
-    Block{"BinPick_Status", kStatusFirst, kStatusLength, "cell to PLC, read with one function 3 with the result"},
-    Block{"BinPick_Result", kResultFirst, kResultLength, "cell to PLC, read with one function 3 with the status"},
+    Block{"BinPick_Request", kRequestFirst, kRequestLength, "PLC to cell, written with one function 16",
+          "PLC to cell, read by the cell"},
+    Block{"BinPick_Status", kStatusFirst, kStatusLength, "cell to PLC, read with one function 3 with the result",
+          "cell to PLC, written by the cell"},
+    Block{"BinPick_Result", kResultFirst, kResultLength, "cell to PLC, read with one function 3 with the status",
+          "cell to PLC, written by the cell"},
 };
 
 constexpr std::string_view kBefore = R"(// 1. What the cell says.
@@ -105,6 +108,10 @@ END_IF;
 
 constexpr std::string_view kAfter = R"(
 // 4. What is written: levels that belong to the step, and a heartbeat.
+// In Idle a result answers what was asked before this program was restarted: nobody waits for it.
+IF (@step = {Idle}) AND @status.status[result_valid] THEN
+   @request.result_ack := @answer.result_sequence;
+END_IF;
 )";
 
 constexpr std::string_view kOutputs = R"(IF @request.plc_heartbeat >= 32767 THEN
@@ -281,6 +288,10 @@ std::string unit_of(const Register& r, const ExportOptions& options) {
 
 std::span<const Variable> program_variables() { return kVariables; }
 std::span<const Block> map_blocks() { return kBlocks; }
+
+std::string_view help_of(const Block& block, const ExportOptions& options) {
+  return options.role == LineRole::Client ? block.help_asked : block.help;
+}
 
 std::vector<Register> registers_of(const Block& block) {
   std::vector<Register> out;

@@ -30,7 +30,9 @@ struct Block {
   std::uint16_t first;
   std::uint16_t length;
   std::string_view help;
+  std::string_view help_asked;  ///< Where the cell is the client.
 };
+std::string_view help_of(const Block& block, const ExportOptions& options);
 std::span<const Block> map_blocks();
 std::vector<Register> registers_of(const Block& block);
 /// "40018 (word 17), bits: 0 ready, 1 ack. Status bits." as it stands beside a member.

@@ -157,7 +157,8 @@ that the program runs on.
 
 ## The line
 
-* Modbus/TCP. The cell is the server (`plc.listen` of the cell file, usually port 502), the PLC is the client. Any unit id.
+* Modbus/TCP. The cell is the server (`plc.listen` of the cell file, usually port 502), the PLC is the client. Any unit id. With
+  `plc.role = "client"` it is the other way round: [see below](#the-other-way-round-the-plc-is-the-server).
 * Functions 3 and 4 read (both the same words), 6, 16 and 23 write, 8/0 echoes. Everything else is refused.
 * **Write the whole request block** (words 0 … 7) with one function 16, in every poll. **Read status and result** (words 8 … 81,
   74 words) with one function 3, in every poll. A poll of 20 … 100 ms is right.
@@ -176,6 +177,26 @@ that the program runs on.
 | 2 | a word outside the map, or a write outside the request block |
 | 3 | a count or length that does not fit |
 | 6 | another client writes already |
+
+### The other way round: the PLC is the server
+
+With `plc.role = "client"` the cell connects to a Modbus server in the PLC (`plc.address`; MB_SERVER of an S7, a server add-on
+instruction of a Logix) and asks for unit `plc.unit_id`. The PLC keeps the same map in its holding registers, from
+`plc.base_address` on, and the same handshake: what this page calls writing is then setting words 0 … 7, and reading is looking at
+words 8 … 81.
+
+* Every `plc.poll_ms` the cell reads all 82 words with one function 3. What has changed in the request block counts when two reads
+  agree on it, `plc_heartbeat` apart; a raised `request` stands until `ack`, so nothing is missed.
+* The cell writes with function 16, words 8 … 39 or 8 … 81 in one request and word 17, `status`, once more alone: a flag falls before
+  the words that it speaks for change, and rises when all of them are there. Nobody else writes words 8 … 81; the cell reads them
+  back, says in its log that somebody did, and writes them anew.
+* **Raise `request` only while `ack` is 0**: else the cell, which looks now and then, may not have seen the last one fall.
+* After connecting, the cell writes everything anew before it believes anything in the request block. A request that stands then and
+  was answered before gets the same answer, no second sweep; one that stood when the cell came up is not carried out (code 30).
+* No reply within `plc.reply_timeout_ms`, an exception, a reply of another transaction, unit, function or length: the cell says so in
+  its log, closes the connection and connects anew, ever more slowly up to every 2 s. After `plc.heartbeat_timeout_ms` that is alarm
+  400 or 401.
+* The PLC's server needs one connection free for the cell. An MB_SERVER has one; let nothing else use its port.
 
 )";
 
@@ -273,11 +294,17 @@ Put the arrays into data blocks with standard access (`{ S7_Optimized_Access := 
 2 · (n − 8) of the array that was read. Do not change inputs while BUSY is 1. `binpick export plc --for s7` writes all of this and the
 handshake as an SCL source: [plc/tia-portal.md](plc/tia-portal.md).
 
+With `plc.role = "client"` call MB_SERVER in every cycle instead, with a structure of the 82 words in a data block with standard access
+as MB_HOLD_REG, and `plc.base_address` as HR_Start_Offset: `binpick export plc --for s7 --role client`.
+
 ## Rockwell Logix
 
 `plc.word_order = "logix"`. One transaction writes 8 words at address 0, one reads 74 words at address 8 into an INT array; COP from it
 into a structure of INT, DINT and REAL: each 32-bit value of a block starts at an even word, so that the structure has no holes.
 `binpick export plc --for logix` writes the structures, tags and the handshake: [plc/studio-5000.md](plc/studio-5000.md).
+
+With `plc.role = "client"` the server's array of holding registers has the 82 words from `plc.base_address` on; the same program, written by
+`--role client`, says what to copy where.
 )";
 }  // namespace
 

@@ -18,7 +18,7 @@
 namespace binpick::tools {
 namespace {
 struct Wish {
-  std::string make, out = ".", cell, host;
+  std::string make, role, out = ".", cell, host;
 };
 
 std::optional<std::array<std::uint8_t, 4>> parse_ipv4(std::string_view text) {
@@ -43,10 +43,16 @@ std::string take_cell(const Wish& wish, plc::ExportOptions& options) {
     return wish.cell + ": plc.word_order is \"" + (s7 ? "s7" : "logix") + "\", which a PLC programmed for " +
            wish.make + " would read wrongly; write word_order = \"" + wish.make + "\" there, or export --for " +
            (s7 ? "s7" : "logix");
-  const std::string_view listen = cell->plc_listen;
-  const std::size_t colon = listen.rfind(':');
-  std::from_chars(listen.data() + colon + 1, listen.data() + listen.size(), options.port);
-  const auto host = parse_ipv4(listen.substr(0, colon));
+  const bool polls = cell->plc.role == plc::LineRole::Client;
+  if (!wish.role.empty() && (wish.role == "client") != polls)
+    return wish.cell + ": plc.role is \"" + (polls ? "client" : "server") + "\"; write role = \"" + wish.role +
+           "\" there, or leave --role " + wish.role + " out";
+  options.role = cell->plc.role;
+  const std::string_view line = cell->plc_line();
+  const std::size_t colon = line.rfind(':');
+  std::from_chars(line.data() + colon + 1, line.data() + line.size(), options.port);
+  // What plc.address names is the PLC itself.
+  const auto host = polls ? std::nullopt : parse_ipv4(line.substr(0, colon));
   if (host && *host != std::array<std::uint8_t, 4>{}) options.host = *host;
   options.base_address = cell->plc.base_address;
   options.pose_convention = cell->plc.pose_convention;
@@ -61,6 +67,7 @@ int refuse(const std::string& trouble, int status) {
 
 int export_plc(const Wish& wish) {
   plc::ExportOptions options;
+  if (wish.role == "client") options.role = plc::LineRole::Client;
   if (!wish.cell.empty())
     if (const std::string trouble = take_cell(wish, options); !trouble.empty()) return refuse(trouble, 2);
   if (!wish.host.empty()) {
@@ -93,6 +100,10 @@ void add_export(CLI::App& app, int& exit_status) {
   plc->add_option("--for", wish->make, "s7: TIA Portal, S7-1200/1500; logix: Studio 5000")
       ->required()
       ->check(CLI::IsMember({"s7", "logix"}));
+  plc->add_option("--role", wish->role,
+                  "what binpickd is on the Modbus line: server, the PLC connects to it (MB_CLIENT); client, it asks a "
+                  "server in the PLC (MB_SERVER). Default: plc.role of the cell file, else server")
+      ->check(CLI::IsMember({"client", "server"}));
   plc->add_option("--out", wish->out, "folder, made when it is not there (default: this one)");
   plc->add_option("--cell", wish->cell,
                   "cell file: port, base address, pose convention and time-outs are taken from it");

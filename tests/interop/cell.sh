@@ -2,6 +2,7 @@
 #   write_cell PORT s7|logix [MORE LINES OF [plc]]   the cell file $work/cell.toml, an empty PORT: a free one
 #   start_cell s7|logix [MORE LINES OF [plc]]        the same and the daemon on it; sets $plc to the daemon's Modbus port
 #   stop_cell
+# plc_role=client before it: the daemon polls a PLC at $plc, which somebody else has to play.
 build=${BINPICK_BUILD:-$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)/../../build/release}
 parts=$build/tests/support/parts
 work=$(mktemp -d)
@@ -35,7 +36,7 @@ write_cell() {
 [cell]
 state_dir = "$work/state"
 [plc]
-listen = "127.0.0.1:${1:-$any}"
+$(if [[ ${plc_role-server} == client ]]; then echo 'role = "client"'; echo -n address; else echo -n listen; fi) = "127.0.0.1:${1:-$any}"
 word_order = "$2"
 ${3-}
 [pivot]
@@ -67,13 +68,14 @@ TOML
 start_cell() {
   local order=$1
   write_cell "" "$@"
-  plc=$(sed -n 's/^listen = "127.0.0.1:\(.*\)"/\1/p' "$work/cell.toml" | head -n 1)
+  plc=$(sed -n 's/^\(listen\|address\) = "127.0.0.1:\(.*\)"/\2/p' "$work/cell.toml" | head -n 1)
   "$build/tools/binpick" check "$work/cell.toml"
   "$build/tests/emulators/program/binpick-emulator" pivot scanner robot --config "$work/cell.toml" \
     --part track_link --objects 6 --seed 4 <"$work/commands" >"$work/emulator-$order.log" 2>&1 &
   pids+=($!)
   "$build/daemon/binpickd" --config "$work/cell.toml" 2>"$work/binpickd-$order.log" &
   pids+=($!)
+  [[ ${plc_role-server} == server ]] || return 0
   for _ in {1..100}; do
     (: <"/dev/tcp/127.0.0.1/$plc") 2>/dev/null && break
     sleep 0.1

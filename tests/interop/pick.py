@@ -1,14 +1,18 @@
 """Plays the PLC for whole picks with pymodbus, written from docs/plc-registers.md alone. No code of binpick is used.
 
-Usage: pick.py HOST PORT s7|logix [PART [SUPPLY [PICKS]]]
+Usage: pick.py HOST PORT s7|logix [PART [SUPPLY [PICKS]]] [--serve]
+--serve: HOST and PORT are where this PLC's own Modbus server listens; the cell is its client (plc.role = "client").
 Prints one line per pick; exit 0 when the whole handshake went as the page says, 1 with the reason when not.
 Runs with pymodbus 3.0.0rc1 (Debian's python3-pymodbus) and later.
 """
 import struct
 import sys
+import threading
 import time
 
 from pymodbus.client import ModbusTcpClient
+from pymodbus.datastore import ModbusSequentialDataBlock, ModbusServerContext, ModbusSlaveContext
+from pymodbus.server import StartTcpServer
 
 # Words of the request block, bits and codes: docs/plc-registers.md.
 REQUEST, ABORT, RESET, ROBOT_CLEAR = 1, 2, 4, 8
@@ -30,6 +34,9 @@ class Plc:
         self.order = order
         self.block = [0] * 8
         self.words = []
+        self.connect(host, port)
+
+    def connect(self, host, port):
         self.client = ModbusTcpClient(host, port=port, timeout=2)
         expect(self.client.connect(), f"no connection to {host}:{port}")
 
@@ -115,6 +122,35 @@ class Plc:
         expect(not any(self.words[40 - 8:]), "result block is not zero after the acknowledge")
 
 
+class ServingPlc(Plc):
+    """The same program on registers of its own, which the cell reads and writes."""
+
+    def connect(self, host, port):
+        self.registers = ModbusSequentialDataBlock(0, [0] * 82)
+        context = ModbusServerContext(ModbusSlaveContext(hr=self.registers, zero_mode=True), single=True)
+        threading.Thread(target=StartTcpServer, kwargs={"context": context, "address": (host, port)}, daemon=True).start()
+
+    def poll(self):
+        self.block[0] = (self.block[0] + 1) & 0xFFFF
+        self.registers.setValues(0, self.block)
+        time.sleep(0.03)
+        words = self.registers.getValues(8, 74)
+        # A flag never stands over half of its words.
+        if words[17 - 8] & RESULT_VALID:
+            expect(words[40 - 8] == words[81 - 8] != 0, f"result_valid over sequence {words[40 - 8]} and {words[81 - 8]}")
+        self.words = words
+
+    def meet(self):
+        self.block[7] = ROBOT_CLEAR
+        self.words = [0] * 74
+        self.wait("the cell to write its map", lambda: self.word(8) != 0, 20)
+        super().meet()
+
+    def raise_request(self, part, supply, again=False):
+        self.wait("ack to fall", lambda: not self.status(ACK), 2)
+        super().raise_request(part, supply, again)
+
+
 def one_pick(plc, part, supply):
     plc.wait("ready", lambda: plc.status(READY))
     expect(plc.word(19) == 0, "ready, and yet not_ready gives a reason")
@@ -144,12 +180,14 @@ def one_pick(plc, part, supply):
 
 
 def main(arguments):
+    serve = "--serve" in arguments
+    arguments = [a for a in arguments if a != "--serve"]
     if len(arguments) < 3 or arguments[2] not in ("s7", "logix"):
         print(__doc__.strip(), file=sys.stderr)
         return 2
     part, supply, picks = (int(v) for v in (arguments[3:] + ["1", "1", "1"][len(arguments) - 3:]))
     try:
-        plc = Plc(arguments[0], int(arguments[1]), arguments[2])
+        plc = (ServingPlc if serve else Plc)(arguments[0], int(arguments[1]), arguments[2])
         plc.meet()
         for _ in range(picks):
             one_pick(plc, part, supply)
@@ -161,14 +199,15 @@ def main(arguments):
         # Abort and reset are acknowledged by level in any state.
         plc.level(ABORT, ABORT_ACK)
         plc.level(RESET, RESET_ACK)
-        # A write outside the request block is refused with exception 2.
-        answer = plc.client.write_register(17, 1, slave=255)
-        expect(answer.isError() and answer.exception_code == 2, f"a write to status gave {answer}")
-        plc.client.close()
+        if not serve:
+            # A write outside the request block is refused with exception 2.
+            answer = plc.client.write_register(17, 1, slave=255)
+            expect(answer.isError() and answer.exception_code == 2, f"a write to status gave {answer}")
+            plc.client.close()
     except Wrong as wrong:
         print(f"pick.py: {wrong}", file=sys.stderr)
         return 1
-    print(f"{picks} picks over pymodbus, {arguments[2]}: good")
+    print(f"{picks} picks over pymodbus{' as server' if serve else ''}, {arguments[2]}: good")
     return 0
 
 

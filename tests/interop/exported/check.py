@@ -1,13 +1,15 @@
 """Runs what `binpick export plc` wrote against a cell that runs: the sources are read, laid out as the makers' tools do,
 compared with docs/plc-registers.md and with the words on the wire, and the exported program picks. The PLC is this program.
 
-Usage: check.py s7|logix FOLDER HOST PORT BASE [--refused | --no-devices]
+Usage: check.py s7|logix FOLDER HOST PORT BASE [--serve] [--refused | --no-devices]
+--serve: the program has a Modbus server, at PORT of this machine, and the cell is its client.
 --refused: the cell has the other word order; the program has to say so and must not ask for picks.
 --no-devices: the other side is plc_bench_server, which finds a pick in every request: all that can happen on the line.
 No code and no table of binpick is used; pymodbus 3.0.0rc1 (Debian's python3-pymodbus) and later.
 """
 import os
 import re
+import socket
 import struct
 import sys
 import time
@@ -79,11 +81,88 @@ class Network:
         return self.client.read_holding_registers(self.base, 82, slave=255).registers
 
 
+class Registers(Network):
+    """The PLC's own Modbus server: one connection, the map as holding registers, functions 3, 6 and 16 (MODBUS Application
+    Protocol V1.1b3). Called by the program as a network is, so that one runs in either role."""
+
+    def __init__(self, host, port, base):
+        super().__init__(host, port, base)
+        self.registers = [0] * 82
+        self.listener = socket.create_server((host, port))
+        self.listener.setblocking(False)
+        self.peer, self.received = None, b""
+
+    def __call__(self, function, address, words):
+        at = address - self.base
+        if function == 16:
+            self.registers[at:at + len(words)] = words
+        self.pump()
+        if self.cut:
+            return None
+        return [] if function == 16 else self.registers[at:at + words]
+
+    def words(self):
+        self.pump()
+        return list(self.registers)
+
+    def close(self):
+        if self.peer:
+            self.peer.close()
+        self.peer, self.received = None, b""
+
+    def pump(self):
+        try:
+            peer, _ = self.listener.accept()
+            self.close()
+            self.peer = peer
+            self.peer.setblocking(False)
+        except BlockingIOError:
+            pass
+        if self.cut:
+            self.close()
+        while self.peer:
+            try:
+                chunk = self.peer.recv(4096)
+            except BlockingIOError:
+                return
+            except ConnectionError:
+                chunk = b""
+            if not chunk:
+                return self.close()
+            self.received += chunk
+            while self.peer and len(self.received) >= 8 and len(self.received) >= 6 + int.from_bytes(self.received[4:6], "big"):
+                length = 6 + int.from_bytes(self.received[4:6], "big")
+                frame, self.received = self.received[:length], self.received[length:]
+                pdu = self.answer(frame[7:])
+                self.peer.sendall(frame[:4] + struct.pack(">HB", 1 + len(pdu), frame[6]) + pdu)
+
+    def answer(self, pdu):
+        self.exchanges += 1
+        function, address, count = struct.unpack(">BHH", pdu[:5])
+        at = address - self.base
+        if function == 3:
+            if at < 0 or at + count > 82:
+                return bytes([0x83, 2])
+            words = list(self.registers)
+            if self.deaf:
+                words[7] &= ~1
+            return struct.pack(f">BB{count}H", 3, 2 * count, *words[at:at + count])
+        expect(function == 16 and len(pdu) == 6 + 2 * count and pdu[5] == 2 * count, f"the cell sends {pdu.hex()}")
+        if at < 8 or at + count > 82:
+            return bytes([0x90, 2])
+        self.registers[at:at + count] = struct.unpack(f">{count}H", pdu[6:])
+        result = self.registers[40:]
+        if self.registers[17] & 8:
+            expect(result[0] != 0 and result[0] == result[-1], "result_valid over half a result")
+            self.answers[result[0]] = result
+        return pdu[:5]
+
+
 class Plc:
     """The exported program, scan after scan, with the hand of a user program."""
 
-    def __init__(self, machine, network):
-        self.machine, self.network, self.speed = machine, network, 1.0
+    def __init__(self, load, network):
+        self.load, self.machine, self.network, self.speed = load, load(), network, 1.0
         self.now = self.real = time.monotonic()
         self.steps = []
 
@@ -103,6 +182,12 @@ class Plc:
 
     def __getitem__(self, name):
         return self.machine.output(name)
+
+    def restart(self):
+        """Power off and on: all variables begin anew, the inputs stay wired."""
+        wired = {name: self[name] for name in ("enable", "robot_clear", "part_id", "supply_id")}
+        self.machine = self.load()
+        self.say(**wired)
 
     def wait(self, what, condition, seconds=30.0):
         end = time.monotonic() + seconds
@@ -261,6 +346,16 @@ def without_devices(plc, make):
     plc.finish()
     plc.through_the_robot()
 
+    # The program is restarted with a request under way: nobody waits for its answer any more, and it is in nobody's way.
+    plc.wait("ready", lambda: plc["ready"])
+    plc.say(start=True)
+    plc.wait_step(WAIT_SCAN_DONE)
+    plc.restart()
+    plc.wait_step(IDLE)
+    plc.wait("the old answer to be gone", lambda: plc["ready"], 10)
+    pick(plc, make)
+    plc.through_the_robot()
+
     # The cell does not see the request: the program's own time-out, abort, and on. Its clock runs faster meanwhile.
     plc.wait("ready", lambda: plc["ready"])
     plc.network.deaf, plc.speed = True, 3.0
@@ -279,16 +374,16 @@ def main(arguments):
         print(__doc__.strip(), file=sys.stderr)
         return 2
     make, folder, host, port, base = arguments[0], arguments[1], arguments[2], int(arguments[3]), int(arguments[4])
-    network = Network(host, port, base)
+    network = (Registers if "--serve" in arguments else Network)(host, port, base)
     try:
         if make == "s7":
             source = Source(os.path.join(folder, "BinPick.scl"))
             exported = source.exchanged()[2]
-            plc = Plc(Cpu(source, network, port), network)
+            plc = Plc(lambda: Cpu(source, network, port, base), network)
         else:
             source = Project(folder)
             exported = source.exchanged()
-            plc = Plc(Controller(source, network, base), network)
+            plc = Plc(lambda: Controller(source, network, base), network)
         check_map(make, exported)
         plc.say(enable=True, robot_clear=True, part_id=1, supply_id=1)
         if "--refused" in arguments:

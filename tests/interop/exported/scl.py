@@ -1,5 +1,6 @@
 """Reads an SCL source as TIA Portal's external sources are written, lays its standard data blocks out and runs its
-function block. MB_CLIENT is played as its help describes it: jobs by level, inputs unchanged while one runs."""
+function block. MB_CLIENT is played as its help describes it: jobs by level, inputs unchanged while one runs; MB_SERVER
+likewise: the area is what it serves, from HR_Start_Offset on."""
 import re
 
 from memory import Layout, Memory, Structure, Timer
@@ -72,14 +73,19 @@ class Source:
         return name, layout, out
 
 
+class Service:
+    """An instance of MB_SERVER."""
+    offset = 0
+
+
 class Cpu(Memory):
     """One S7 CPU with the function block of the source. `exchange(function, address, words)` is the network."""
     order = ">"
     types = {name: code for name, (_, code) in ELEMENTARY.items()}
 
-    def __init__(self, source, exchange, port):
+    def __init__(self, source, exchange, port, base):
         super().__init__()
-        self.exchange, self.port = exchange, port
+        self.exchange, self.port, self.base = exchange, port, base
         block, layout, _ = source.exchanged()
         self.declare(f'"{block}"', Structure(layout, self))
         self.connection = dict(re.findall(r"connect\.([\w.\[\]]+) := ([^;]+);", source.data_blocks["BinPick_Connection"]))
@@ -93,8 +99,8 @@ class Cpu(Memory):
                     value = Structure(source.layouts[kind], self)
                 else:
                     value = Timer() if kind == "TON_TIME" else "client" if kind == "MB_CLIENT" else \
-                        False if kind == "Bool" else 0
-                    expect(kind in ("TON_TIME", "MB_CLIENT", "Bool") or kind in RANGES, f"{name} : {kind}")
+                        Service() if kind == "MB_SERVER" else False if kind == "Bool" else 0
+                    expect(kind in ("TON_TIME", "MB_CLIENT", "MB_SERVER", "Bool") or kind in RANGES, f"{name} : {kind}")
                 self.declare("#" + name, value, RANGES.get(kind))
         self.program = Parser(statements, literals=True).program()
         self.running, self.job_ended = None, None
@@ -121,12 +127,40 @@ class Cpu(Memory):
             instance.enabled, instance.preset = values["IN"], values["PT"]
             instance.update(self.now)
             return
-        expect(instance == "client", f"{path} cannot be called")
+        serves = isinstance(instance, Service)
+        expect(serves or instance == "client", f"{path} cannot be called")
         inputs = {name: value for name, way, value in args if way == ":="}
         outputs = {name: target for name, way, target in args if way == "=>"}
-        answer = self.mb_client(inputs)
+        answer = self.mb_server(instance, inputs) if serves else self.mb_client(inputs)
         for name, value in answer.items():
             self.set(outputs[name], value)
+
+    def set(self, path, new):
+        instance = self.variables.get(path[0])
+        if isinstance(instance, Service):
+            expect(path[1:] == ["HR_Start_Offset"] and 0 <= new <= 65535, f"{path} := {new}")
+            instance.offset = new
+            return
+        super().set(path, new)
+
+    def mb_server(self, service, inputs):
+        expect(inputs["CONNECT"] == ("get", ['"BinPick_Connection"', "connect"]), "CONNECT")
+        c = self.connection
+        expect(int(c["ConnectionType"].replace("16#", ""), 16) == 11 and c["ActiveEstablished"] == "FALSE", f"{c}")
+        expect(int(c["LocalPort"]) == self.port and c["RemotePort"] == "0" and 1 <= int(c["ID"]) <= 4095, f"{c}")
+        expect(service.offset == self.base, f"HR_Start_Offset is {service.offset}")
+        area = self.get(inputs["MB_HOLD_REG"][1])
+        expect(isinstance(area, Structure) and area.layout.size == 2 * 82, "MB_HOLD_REG has not 82 words")
+        answer = {"NDR": False, "DR": False, "ERROR": False, "STATUS": 0x7002}
+        if self.argument(inputs["DISCONNECT"]):
+            return answer
+        first = service.offset
+        words = [int.from_bytes(area.bytes()[i:i + 2], "big") for i in range(0, 16, 2)]
+        self.exchange(16, first, words)
+        read = self.exchange(3, first + 8, 74)
+        if read is not None:
+            area.fill(area.bytes()[:16] + b"".join(w.to_bytes(2, "big") for w in read))
+        return answer
 
     def mb_client(self, inputs):
         expect(inputs["CONNECT"] == ("get", ['"BinPick_Connection"', "connect"]), "CONNECT")

@@ -89,6 +89,29 @@ TEST(Export, AddressesFollowTheOptions) {
   EXPECT_TRUE(has(export_s7(options)[0].content, "MB_DATA_ADDR := 409921,"));
 }
 
+TEST(Export, WhereTheCellIsTheClientThePlcServesTheMap) {
+  ExportOptions options;
+  options.role = LineRole::Client;
+  options.host = {10, 1, 2, 3};
+  options.port = 1502;
+  options.base_address = 200;
+  const auto files = everything(options);
+  const std::string& scl = content(files, "BinPick.scl");
+  EXPECT_TRUE(has(scl, "server : MB_SERVER;") && has(scl, "#server(DISCONNECT := NOT #enable,"));
+  EXPECT_FALSE(has(scl, "MB_CLIENT") || has(scl, "MB_DATA_PTR") || has(scl, "t_poll"));
+  EXPECT_TRUE(has(scl, "#server.HR_Start_Offset := 200;"));
+  EXPECT_TRUE(has(scl, "MB_HOLD_REG := \"BinPick_Data\".registers"));
+  EXPECT_TRUE(has(scl, "connect.ActiveEstablished := FALSE;") && has(scl, "connect.RemotePort := 0;") &&
+              has(scl, "connect.LocalPort := 1502;") && has(scl, "connect.RemoteAddress.ADDR[2] := 1;"));
+  EXPECT_TRUE(has(content(files, "BinPick_Tags.CSV"), "holding registers from address 200, 8 words"));
+  EXPECT_TRUE(has(content(files, "BinPick_Tags.CSV"), "holding registers from address 208, 74 words"));
+  EXPECT_TRUE(has(content(files, "BinPick.st"), "another program, the Modbus server, moves both arrays"));
+  // The handshake is the same program, word for word.
+  ExportOptions served = options;
+  served.role = LineRole::Server;
+  EXPECT_EQ(program_body(Dialect::S7, options), program_body(Dialect::S7, served));
+}
+
 TEST(Export, TheBitsOfAStepAreWrittenFromTheTable) {
   const std::string s7 = program_body(Dialect::S7, {}), logix = program_body(Dialect::Logix, {});
   EXPECT_TRUE(has(s7, "#request.control.%X0 := (#step = 20);"));

@@ -62,6 +62,26 @@ TEST(ExportCommand, ACellFileForTheOtherMakeIsWrongInput) {
   EXPECT_FALSE(std::filesystem::exists(folder.path("none")));
 }
 
+TEST(ExportCommand, TheRoleIsTheCellFilesOrNamed) {
+  config::CellFolder folder;
+  folder.edit("role = \"server\"", "role = \"client\"").edit("listen = \"0.0.0.0:502\"", "");
+  folder.edit("address = \"\"", "address = \"192.168.0.10:1502\"");
+  ASSERT_TRUE(folder.load().has_value()) << folder.findings();
+  const auto scl = [&] { return config::read_text(folder.path("BinPick.scl")); };
+  Answer answer = export_plc({"--for", "s7", "--out", folder.path("."), "--cell", folder.path("cell.toml")});
+  ASSERT_EQ(answer.exit_status, 0) << answer.err;
+  EXPECT_NE(scl().find("connect.LocalPort := 1502;"), std::string::npos);
+  EXPECT_NE(scl().find("connect.RemoteAddress.ADDR[4] := 20;"), std::string::npos) << "plc.address is the PLC's own";
+  answer =
+      export_plc({"--for", "s7", "--role", "server", "--out", folder.path("none"), "--cell", folder.path("cell.toml")});
+  EXPECT_EQ(answer.exit_status, 2);
+  EXPECT_EQ(answer.err, "binpick export: " + folder.path("cell.toml") +
+                            ": plc.role is \"client\"; write role = \"server\" there, or leave --role server out\n");
+  answer = export_plc({"--for", "s7", "--role", "client", "--out", folder.path(".")});
+  ASSERT_EQ(answer.exit_status, 0) << answer.err;
+  EXPECT_NE(scl().find("MB_SERVER"), std::string::npos);
+}
+
 TEST(ExportCommand, WrongInputIsOneLine) {
   for (const char* host : {"10.0.0", "10.0.0.256", "10.0.0.1.2", "cell", "1.2.3.4 "}) {
     const Answer answer = export_plc({"--for", "s7", "--host", host});
