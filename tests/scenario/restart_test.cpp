@@ -32,6 +32,36 @@ TEST(Restart, ThePivotStopsByItselfWhenTheDaemonVanishesInASweep) {
   EXPECT_EQ(result->code, plc::ResultCode::PickFound);
 }
 
+TEST(Restart, APlcThatIsPolledMeetsTheNewDaemonAndABrokenLineLosesNoPick) {
+  CellFile file;
+  file.plc_role = "client";
+  EmulatedCell cell{test_folder().load(file), scene_of("track_link", 2, 3)};
+  ASSERT_TRUE(cell.run_until_ready());
+  const auto boot = cell.plc.boot_count();
+  cell.plc.raise_request(1, 1);
+  ASSERT_TRUE(cell.run_until([&] { return cell.cell().sweep_state() == drivers::sweep::State::Sweeping; }));
+  cell.kill_daemon();
+  cell.run_for(1s);
+  EXPECT_TRUE(cell.plc.busy()) << "the registers are the PLC's: they stay as they were";
+  const auto sweeps = cell.sweeps();
+  cell.start_daemon();
+  ASSERT_TRUE(cell.run_until([&] { return cell.plc.boot_count() != boot; }));
+  EXPECT_FALSE(cell.plc.result_valid() || cell.plc.busy());
+  ASSERT_TRUE(cell.run_until_ready());
+  EXPECT_EQ(cell.sweeps(), sweeps) << "what was asked of the old one is not carried out";
+
+  cell.plc.raise_request(1, 1);
+  ASSERT_TRUE(cell.run_until([&] { return cell.cell().sweep_state() == drivers::sweep::State::Sweeping; }));
+  cell.plc.faults.unplugged = true;
+  cell.run_for(1s);
+  cell.plc.faults = {};
+  std::optional<emulators::PlcResult> result;
+  ASSERT_TRUE(cell.run_until([&] { return (result = cell.plc.take_result()).has_value(); }));
+  EXPECT_EQ(result->code, plc::ResultCode::PickFound);
+  EXPECT_EQ(cell.sweeps(), sweeps + 1);
+  EXPECT_EQ(cell.plc.torn_reads(), 0U);
+}
+
 TEST(Restart, ARequestThatStandsAtTheStartIsNotExecuted) {
   EmulatedCell cell{test_folder().load({}), scene_of("track_link", 2, 3)};
   ASSERT_TRUE(cell.run_until_ready());
