@@ -12,6 +12,10 @@ Chosen chosen(Enum& target, const Enum (&values)[n]) {
       [&target, list](std::size_t i) { target = list.at(i); },
       [&target, list] { return static_cast<std::size_t>(std::find(list.begin(), list.end(), target) - list.begin()); }};
 }
+constexpr const char* kSick = "scanner.model = lms400";
+constexpr const char* kLeuze = "scanner.model = lps36, lps36hi";
+constexpr const char* kOnPivot = "scanner.carrier = pivot";
+constexpr const char* kOnRobot = "scanner.carrier = robot";
 }  // namespace
 
 // A table, one key each: the formatter would give every field its own line.
@@ -20,8 +24,6 @@ const std::vector<Section<Config>>& cell_sections() {
   using enum Type;
   using C = Config;
   constexpr Change kRestart = Change::Restart;
-  constexpr const char* kSick = "scanner.model = lms400";
-  constexpr const char* kLeuze = "scanner.model = lps36, lps36hi";
   static const std::vector<Section<Config>> sections = {
       {"cell",
        "The cell as a whole.",
@@ -102,36 +104,45 @@ const std::vector<Section<Config>>& cell_sections() {
       {"pivot",
        "The Schunk PR 70 (PowerCube) that turns the scanner.",
        {
-           {{.name = "can", .type = CanBus, .required = true, .example = "\"can0\"", .change = kRestart,
+           {{.name = "can", .type = CanBus, .only_for = kOnPivot, .in_example = true,
+             .required = true, .example = "\"can0\"", .change = kRestart,
              .help = "The CAN bus: a network interface (can0), or cannelloni://HOST:PORT for CAN over UDP."},
             [](C& c) -> Slot { return &c.pivot_can; }},
-           {{.name = "can_listen_port", .type = Integer, .max = 65535, .default_value = "0", .change = kRestart,
+           {{.name = "can_listen_port", .type = Integer, .max = 65535, .only_for = kOnPivot, .in_example = true,
+             .default_value = "0", .change = kRestart,
              .help = "Own UDP port for cannelloni; 0: any."},
             [](C& c) -> Slot { return &c.pivot_can_listen_port; }},
-           {{.name = "module_id", .type = Integer, .min = 1, .max = 31, .default_value = "12", .change = kRestart,
+           {{.name = "module_id", .type = Integer, .min = 1, .max = 31, .only_for = kOnPivot, .in_example = true,
+             .default_value = "12", .change = kRestart,
              .help = "The module's number on the bus."},
             [](C& c) -> Slot { return &c.pivot.module_id; }},
            {{.name = "reply_timeout_ms", .type = Integer, .unit = "ms", .min = 10, .max = 5000,
+             .only_for = kOnPivot, .in_example = true,
              .default_value = "100", .change = kRestart,
              .help = "Silence after a request before it is repeated, then given up."},
             [](C& c) -> Slot { return &c.pivot.reply_timeout; }},
-           {{.name = "sample_period_ms", .type = Integer, .unit = "ms", .min = 2, .max = 100, .default_value = "10",
+           {{.name = "sample_period_ms", .type = Integer, .unit = "ms", .min = 2, .max = 100, .only_for = kOnPivot, .in_example = true,
+             .default_value = "10",
              .change = kRestart,
              .help = "The module's position is asked this often."},
             [](C& c) -> Slot { return &c.pivot.sample_period; }},
            {{.name = "setpoint_horizon_ms", .type = Integer, .unit = "ms", .min = 20, .max = 2000,
+             .only_for = kOnPivot, .in_example = true,
              .default_value = "200", .change = kRestart,
              .help = "While moving, the module knows no target further ahead than this: so long it moves on when "
                      "the daemon vanishes."},
             [](C& c) -> Slot { return &c.pivot.setpoint_horizon; }},
            {{.name = "reference_timeout_s", .type = Integer, .unit = "s", .min = 1, .max = 300,
+             .only_for = kOnPivot, .in_example = true,
              .default_value = "30", .change = kRestart,
              .help = "The module's homing takes no longer than this."},
             [](C& c) -> Slot { return &c.pivot.reference_timeout; }},
-           {{.name = "latency_ms", .type = Number, .unit = "ms", .min = -200, .max = 200, .default_value = "0",
+           {{.name = "latency_ms", .type = Number, .unit = "ms", .min = -200, .max = 200, .only_for = kOnPivot, .in_example = true,
+             .default_value = "0",
              .help = "Added to the time of each position: how much later it was really taken than the answer says."},
             [](C& c) -> Slot { return &c.pivot_latency; }},
-           {{.name = "T_base_pivot", .type = Transform, .required = true,
+           {{.name = "T_base_pivot", .type = Transform, .only_for = kOnPivot, .in_example = true,
+             .required = true,
              .example = "{ xyz_mm = [1200, 0, 1860], rpy_deg = [0, 90, 0] }",
              .help = "Where the pivot stands in the robot's base frame. Its z axis is the axis of rotation."},
             [](C& c) -> Slot { return &c.mount.T_base_pivot.iso; }},
@@ -205,11 +216,21 @@ const std::vector<Section<Config>>& cell_sections() {
            {{.name = "latency_ms", .type = Number, .unit = "ms", .min = -200, .max = 200, .default_value = "0",
              .help = "A profile was measured this much before it came in."},
             [](C& c) -> Slot { return &c.scanner_latency; }},
-           {{.name = "T_pivot_scanner", .type = Transform, .required = true,
+           {{.name = "T_pivot_scanner", .type = Transform, .only_for = kOnPivot, .in_example = true, .required = true,
              .example = "{ xyz_mm = [60, 0, 0], rpy_deg = [180, -90, 0] }",
              .help = "Where the scanner sits on the pivot at angle zero. Its z axis points straight ahead, x lies "
                      "in the scan plane."},
             [](C& c) -> Slot { return &c.mount.T_pivot_scanner.iso; }},
+           {{.name = "carrier", .type = Choice, .default_value = "\"pivot\"", .change = kRestart,
+             .choices = {"pivot", "robot"},
+             .help = "What moves it over the supply: the pivot, or the robot, which carries it along a taught path "
+                     "(docs/robots/)."},
+            [](C& c) -> Slot { return chosen(c.carrier, {Carrier::Pivot, Carrier::Robot}); }},
+           {{.name = "T_flange_scanner", .type = Transform, .only_for = kOnRobot, .required = true,
+             .example = "{ xyz_mm = [0, 80, 120], rpy_deg = [0, 0, 0] }",
+             .help = "Where the scanner sits on the robot's flange. Its z axis points straight ahead, x lies in the "
+                     "scan plane."},
+            [](C& c) -> Slot { return &c.T_flange_scanner.iso; }},
        }},
       {"robot",
        "The socket that the robot's program fetches picks from (docs/robots/).",
@@ -233,6 +254,22 @@ const std::vector<Section<Config>>& cell_sections() {
              .change = kRestart,
              .help = "A robot that says nothing for this long is taken for gone."},
             [](C& c) -> Slot { return &c.robot.silence_max; }},
+           {{.name = "pose_address", .type = Endpoint, .only_for = kOnRobot, .default_value = "\"\"",
+             .example = "\"192.168.0.20:30004\"", .change = kRestart,
+             .help = "For dialect ur: where its poses come from by RTDE, the controller's port 30004."},
+            [](C& c) -> Slot { return &c.pose_address; }},
+           {{.name = "pose_listen", .type = Endpoint, .only_for = kOnRobot, .default_value = "\"\"",
+             .example = "\"0.0.0.0:5003\"", .change = kRestart,
+             .help = "For dialect fanuc and kawasaki: where its background program sends its poses to."},
+            [](C& c) -> Slot { return &c.pose_listen; }},
+           {{.name = "pose_latency_ms", .type = Number, .unit = "ms", .min = -200, .max = 200, .only_for = kOnRobot,
+             .default_value = "0",
+             .help = "A pose was measured this much before its time stamp says."},
+            [](C& c) -> Slot { return &c.pose_latency; }},
+           {{.name = "T_flange_tcp", .type = Transform, .only_for = kOnRobot,
+             .default_value = "{ xyz_mm = [0, 0, 0], rpy_deg = [0, 0, 0] }", .change = kRestart,
+             .help = "The tcp whose pose the robot sends. Not for ur from software 3.12 or 5.5.1 on: it tells by itself."},
+            [](C& c) -> Slot { return &c.T_flange_tcp.iso; }},
        }},
       {"reach",
        "What the gripper can reach.",
@@ -285,18 +322,28 @@ const Section<Supply>& supply_section() {
             .example = "{ xyz_mm = [1200, 0, 0], rpy_deg = [0, 0, 0] }",
             .help = "Middle of its floor in the robot's base frame, z up, x and y along the walls."},
            [](S& s) -> Slot { return &s.T_base_supply.iso; }},
-          {{.name = "sweep_start_deg", .type = Number, .unit = "deg", .min = -160, .max = 160, .required = true,
+          {{.name = "sweep_start_deg", .type = Number, .unit = "deg", .min = -160, .max = 160, .only_for = kOnPivot, .in_example = true,
+            .required = true,
             .example = "-16",
             .help = "Pivot angle at which measuring begins. The module's own limits hold too."},
            [](S& s) -> Slot { return &s.sweep_start; }},
-          {{.name = "sweep_end_deg", .type = Number, .unit = "deg", .min = -160, .max = 160, .required = true,
+          {{.name = "sweep_end_deg", .type = Number, .unit = "deg", .min = -160, .max = 160, .only_for = kOnPivot, .in_example = true,
+            .required = true,
             .example = "16",
             .help = "Pivot angle at which it ends."},
            [](S& s) -> Slot { return &s.sweep_end; }},
           {{.name = "sweep_speed_deg_s", .type = Number, .unit = "deg/s", .min = 1, .max = 149,
+            .only_for = kOnPivot, .in_example = true,
             .default_value = "30", .example = "34",
             .help = "Slower gives more profiles."},
            [](S& s) -> Slot { return InRadians{&s.sweep_speed_rad_s}; }},
+          {{.name = "scan_path", .type = Integer, .min = 1, .max = 999, .only_for = kOnRobot, .default_value = "1",
+            .help = "The path over it, by the number that the robot's program knows."},
+           [](S& s) -> Slot { return &s.scan_path; }},
+          {{.name = "path_timeout_ms", .type = Integer, .unit = "ms", .min = 500, .max = 120000, .only_for = kOnRobot,
+            .default_value = "10000",
+            .help = "From the beginning of the path to its end; longer is a fault. Less than plc.scan_timeout_ms."},
+           [](S& s) -> Slot { return &s.path_timeout; }},
       }};
   return section;
 }

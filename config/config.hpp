@@ -9,6 +9,7 @@
 #include "base/expected.hpp"
 #include "base/frames.hpp"
 #include "drivers/pivot/session.hpp"
+#include "drivers/robot/pose_source.hpp"
 #include "drivers/robot/session.hpp"
 #include "drivers/scanner/any/scanner.hpp"
 #include "plc/session.hpp"
@@ -27,6 +28,9 @@ struct Supply {
   /// The sweep over it.
   Angle sweep_start, sweep_end;
   double sweep_speed_rad_s = 0.5;
+  /// The same where the robot carries the scanner.
+  std::uint16_t scan_path = 1;
+  std::chrono::milliseconds path_timeout{10000};
   friend bool operator==(const Supply&, const Supply&);
 };
 
@@ -55,6 +59,7 @@ struct Detection {
 };
 
 enum class ScannerModel { Lms400, Lps36, Lps36Hi };
+enum class Carrier { Pivot, Robot };
 
 struct Config {
   std::string path;
@@ -73,10 +78,17 @@ struct Config {
   std::optional<int> manual_exposure_us;
   drivers::scanner::Options scanner_options() const;  ///< Of the model that is configured.
   Duration scanner_latency{0};                        ///< Measured this much before the smoothed receive time.
-  vision::ScannerMount mount;
+  Carrier carrier = Carrier::Pivot;
+  vision::ScannerMount mount;                                 ///< On the pivot.
+  Transform<frame::Flange, frame::Scanner> T_flange_scanner;  ///< On the robot.
   std::string robot_listen;
   std::vector<std::string> robot_allow;
   drivers::robot::Options robot;
+  std::string pose_address;  ///< "host:port" of RTDE.
+  std::string pose_listen;   ///< "host:port" for makes that send lines.
+  Duration pose_latency{0};  ///< Measured this much before the time stamp.
+  Transform<frame::Flange, frame::Tcp> T_flange_tcp;
+  drivers::robot::PoseSource::Options pose_options() const;
   std::vector<Supply> supplies;
   std::vector<Recipe> recipes;
   vision::ReachLimits reach;

@@ -162,7 +162,7 @@ CellPlaces read_cell(const Document& document, Config& config, std::vector<std::
   const ReadContext context{findings, document.damaged_keys};
   CellPlaces places;
   places.damaged_keys = document.damaged_keys;
-  const Value empty{};
+  std::vector<const Section<Config>*> absent;
   for (const auto& section : cell_sections()) {
     const Member* member = document.root.find(section.name);
     const Value* table = member == nullptr ? nullptr : as_section(*member, findings);
@@ -170,16 +170,20 @@ CellPlaces read_cell(const Document& document, Config& config, std::vector<std::
       places.sections[section.name] = read_section(*table, section, config, context);
       continue;
     }
-    std::string required;
-    for (const auto& key : section.keys) {
-      set_default(key.facts, key.slot(config));
-      if (key.facts.required && *key.facts.only_for == '\0')
-        required += (required.empty() ? "" : ", ") + std::string{key.facts.name};
-    }
-    if (member == nullptr && !required.empty())
-      findings.add(end_of(document),
-                   std::string{"section ["} + section.name + "] is missing; add it, with " + required);
+    for (const auto& key : section.keys) set_default(key.facts, key.slot(config));
     places.sections[section.name].header = end_of(document);
+    places.sections[section.name].is_there = false;
+    if (member == nullptr) absent.push_back(&section);
+  }
+  // Which of their keys are required may depend on sections that come later.
+  for (const auto* section : absent) {
+    std::string required;
+    for (const auto& key : section->keys)
+      if (key.facts.required && is_for(key.facts, config, places).value_or(false))
+        required += (required.empty() ? "" : ", ") + std::string{key.facts.name};
+    if (!required.empty())
+      findings.add(end_of(document),
+                   std::string{"section ["} + section->name + "] is missing; add it, with " + required);
   }
   const auto missing = [&](const char* name, const char* what) {
     findings.add(end_of(document), std::string{"there is no [["} + name + "]]; add one for each " + what);
@@ -245,7 +249,8 @@ Expected<Part, std::vector<Diagnostic>> load_part_document(Document document) {
 bool operator==(const Supply& a, const Supply& b) {
   return a.id == b.id && a.name == b.name && a.size_mm == b.size_mm &&
          a.T_base_supply.iso.matrix() == b.T_base_supply.iso.matrix() && a.sweep_start == b.sweep_start &&
-         a.sweep_end == b.sweep_end && a.sweep_speed_rad_s == b.sweep_speed_rad_s;
+         a.sweep_end == b.sweep_end && a.sweep_speed_rad_s == b.sweep_speed_rad_s && a.scan_path == b.scan_path &&
+         a.path_timeout == b.path_timeout;
 }
 
 Expected<Config, std::vector<Diagnostic>> load(const std::string& path) { return load_document(path, open(path)); }
@@ -263,6 +268,15 @@ drivers::scanner::Options Config::scanner_options() const {
   options.hi = scanner_model == ScannerModel::Lps36Hi;
   options.profile_timeout = lms400.profile_timeout;
   if (manual_exposure_us) options.manual_exposure = std::chrono::microseconds(*manual_exposure_us);
+  return options;
+}
+
+drivers::robot::PoseSource::Options Config::pose_options() const {
+  if (robot.dialect != drivers::robot::Dialect::UniversalRobots)
+    return drivers::robot::PoseStreamOptions{.dialect = robot.dialect, .T_flange_tcp = T_flange_tcp};
+  drivers::rtde::Options options;
+  // Nobody's tcp is the flange itself and written down as such: the controller is asked.
+  if (!T_flange_tcp.iso.isApprox(Eigen::Isometry3d::Identity())) options.T_flange_tcp = T_flange_tcp;
   return options;
 }
 

@@ -15,6 +15,7 @@ namespace binpick::config {
 /// Where the values of one section stand, for findings across keys.
 struct Places {
   Place header;
+  bool is_there = true;                              ///< The section stands in the file, and is one.
   std::map<std::string, Place, std::less<>> values;  ///< Only keys that stand in the file and were good.
   std::set<std::string, std::less<>> bad;            ///< That stand in the file and were not.
 

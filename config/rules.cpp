@@ -1,5 +1,6 @@
 #include "config/rules.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <optional>
@@ -17,33 +18,19 @@ std::string ms(std::chrono::milliseconds d) { return std::to_string(d.count()); 
 
 std::string port_of(const std::string& endpoint) { return endpoint.substr(endpoint.rfind(':') + 1); }
 
-/// Whether "scanner.model = lps36, lps36hi" holds; nothing where scanner.model itself is bad or missing.
-std::optional<bool> holds(const std::string& condition, Config& config, const CellPlaces& at) {
-  const std::size_t dot = condition.find('.'), equals = condition.find(" = ");
-  const std::string section = condition.substr(0, dot), name = condition.substr(dot + 1, equals - dot - 1);
-  for (const auto& candidate : cell_sections())
-    for (const auto& key : candidate.keys)
-      if (section == candidate.name && name == key.facts.name) {
-        if (key.facts.required && !at.given(section, name)) return std::nullopt;
-        const std::string value = key.facts.choices[std::get<Chosen>(key.slot(config)).get()];
-        return (", " + condition.substr(equals + 3) + ",").find(", " + value + ",") != std::string::npos;
-      }
-  return std::nullopt;
-}
-
 /// Keys that are for one kind of device only.
 template <class Target>
 void check_only_for(const Section<Target>& section, const std::string& where, const Places& places, Config config,
                     const CellPlaces& at, Findings& findings) {
   for (const auto& key : section.keys) {
     if (*key.facts.only_for == '\0') continue;
-    const auto is_for_us = holds(key.facts.only_for, config, at);
+    const auto is_for_us = is_for(key.facts, config, at);
     const std::string name = std::string{section.name} + "." + key.facts.name;
     if (!is_for_us) continue;
     if (!*is_for_us && places.given(key.facts.name))
       findings.add(places.of(key.facts.name), name + " is for " + key.facts.only_for + " only; remove it");
-    if (*is_for_us && key.facts.required && !places.given(key.facts.name) && !places.bad.contains(key.facts.name) &&
-        !at.damaged_keys.contains(key.facts.name))
+    if (*is_for_us && key.facts.required && places.is_there && !places.given(key.facts.name) &&
+        !places.bad.contains(key.facts.name) && !at.damaged_keys.contains(key.facts.name))
       report_missing(key.facts, name, where, places.header, findings);
   }
 }
@@ -58,7 +45,7 @@ void check_devices(const Config& c, const CellPlaces& at, Findings& findings) {
                      " is beyond the field of view, 55 … 125; use range_deg = " +
                      rounded(kFieldOfViewEndDeg - c.lms400.start.in_deg()) + " at most");
   }
-  if (c.pivot.setpoint_horizon < 2 * c.pivot.sample_period) {
+  if (c.carrier == Carrier::Pivot && c.pivot.setpoint_horizon < 2 * c.pivot.sample_period) {
     const bool horizon_given = at.given("pivot", "setpoint_horizon_ms");
     findings.add(at.of("pivot", horizon_given ? "setpoint_horizon_ms" : "sample_period_ms"),
                  "pivot.setpoint_horizon_ms = " + ms(c.pivot.setpoint_horizon) +
@@ -111,7 +98,38 @@ void check_servers(const Config& c, const CellPlaces& at, Findings& findings) {
                  "robot.listen has the same port as plc.listen, " + port + "; use another, such as 5002");
 }
 
+/// Who tells where the robot is while it carries the scanner.
+void check_robot_carrier(const Config& c, const CellPlaces& at, Findings& findings) {
+  if (c.carrier != Carrier::Robot) return;
+  if (c.robot_listen.empty())
+    findings.add(at.of("robot", "listen"),
+                 "robot.listen is empty, but the robot carries the scanner; add, for example: listen = "
+                 "\"0.0.0.0:5002\"");
+  const bool is_ur = c.robot.dialect == drivers::robot::Dialect::UniversalRobots;
+  if (is_ur && c.pose_address.empty())
+    findings.add(at.of("robot", "pose_address"),
+                 "robot.pose_address is missing, but the robot carries the scanner; add, for example: pose_address = "
+                 "\"192.168.0.20:30004\"");
+  if (!is_ur && c.pose_listen.empty())
+    findings.add(at.of("robot", "pose_listen"),
+                 "robot.pose_listen is missing, but the robot carries the scanner; add, for example: pose_listen = "
+                 "\"0.0.0.0:5003\"");
+  if (!c.pose_listen.empty() && port_of(c.pose_listen) != "0" &&
+      (port_of(c.pose_listen) == port_of(c.robot_listen) || port_of(c.pose_listen) == port_of(c.plc_listen)))
+    findings.add(at.of("robot", "pose_listen"), "robot.pose_listen has the port of another socket of the cell, " +
+                                                    port_of(c.pose_listen) + "; use another, such as 5003");
+  const auto longest = std::min(c.plc.scan_timeout, std::chrono::milliseconds{c.robot.silence_max});
+  for (std::size_t i = 0; i < c.supplies.size(); ++i)
+    if (c.supplies[i].path_timeout >= longest)
+      findings.add(at.supplies[i].of("path_timeout_ms"),
+                   "supply.path_timeout_ms = " + ms(c.supplies[i].path_timeout) +
+                       " is not less than plc.scan_timeout_ms = " + ms(c.plc.scan_timeout) +
+                       " and robot.silence_max_s = " + std::to_string(c.robot.silence_max.count()) +
+                       "; use less, or longer time-outs");
+}
+
 void check_sweeps(const Config& c, const CellPlaces& at, Findings& findings) {
+  if (c.carrier != Carrier::Pivot) return;
   constexpr double kLeuzeFrequency_hz = 100;
   const double profiles_per_s = c.scanner_model == ScannerModel::Lms400 ? c.lms400.frequency_hz : kLeuzeFrequency_hz;
   for (std::size_t i = 0; i < c.supplies.size(); ++i) {
@@ -142,7 +160,8 @@ void check_sweeps(const Config& c, const CellPlaces& at, Findings& findings) {
 /// In the middle of a sweep the scanner's middle ray goes down into the supply, or at most half its size beside it.
 /// What looks elsewhere is metres for millimetres, radians for degrees, or a mount with a wrong sign.
 void check_views(const Config& c, const CellPlaces& at, Findings& findings) {
-  const bool mounted = at.given("pivot", "T_base_pivot") && at.given("scanner", "T_pivot_scanner");
+  const bool mounted =
+      c.carrier == Carrier::Pivot && at.given("pivot", "T_base_pivot") && at.given("scanner", "T_pivot_scanner");
   for (std::size_t i = 0; mounted && i < c.supplies.size(); ++i) {
     const Supply& supply = c.supplies[i];
     const Places& places = at.supplies[i];
@@ -188,6 +207,21 @@ void check_ids(const std::vector<Entry>& entries, const std::vector<Places>& pla
 }
 }  // namespace
 
+std::optional<bool> is_for(const KeyFacts& facts, Config config, const CellPlaces& at) {
+  const std::string condition = facts.only_for;
+  if (condition.empty()) return true;
+  const std::size_t dot = condition.find('.'), equals = condition.find(" = ");
+  const std::string section = condition.substr(0, dot), name = condition.substr(dot + 1, equals - dot - 1);
+  for (const auto& candidate : cell_sections())
+    for (const auto& key : candidate.keys)
+      if (section == candidate.name && name == key.facts.name) {
+        if (key.facts.required && !at.given(section, name)) return std::nullopt;
+        const std::string value = key.facts.choices[std::get<Chosen>(key.slot(config)).get()];
+        return (", " + condition.substr(equals + 3) + ",").find(", " + value + ",") != std::string::npos;
+      }
+  return std::nullopt;
+}
+
 void check_rules(const Config& config, const CellPlaces& places, Findings& findings) {
   for (const auto& section : cell_sections())
     check_only_for(section, "[" + std::string{section.name} + "]", places.sections.at(section.name), config, places,
@@ -196,6 +230,7 @@ void check_rules(const Config& config, const CellPlaces& places, Findings& findi
     check_only_for(supply_section(), "[[supply]]", supply, config, places, findings);
   check_devices(config, places, findings);
   check_servers(config, places, findings);
+  check_robot_carrier(config, places, findings);
   check_sweeps(config, places, findings);
   check_views(config, places, findings);
   check_ids(config.supplies, places.supplies, "supply", findings);

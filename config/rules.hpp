@@ -1,5 +1,8 @@
 #pragma once
 
+#include <optional>
+#include <set>
+#include <string>
 #include <vector>
 
 #include "config/reader.hpp"
@@ -18,6 +21,8 @@ struct CellPlaces {
   bool given(const std::string& section, const std::string& key) const { return sections.at(section).given(key); }
 };
 
+/// Whether a key is for this cell, by its `only_for`; nothing where what it depends on is bad or missing itself.
+std::optional<bool> is_for(const KeyFacts& facts, Config config, const CellPlaces& at);
 /// Values that were bad hold their default while this runs, so that one mistake is not told twice.
 void check_rules(const Config& config, const CellPlaces& places, Findings& findings);
 /// Makes the group that [symmetry] describes; false with a finding when it describes none.

@@ -215,6 +215,8 @@ the fixed axes x, then y, then z, in degrees. `T_a_b` maps coordinates in b to c
 - `plc.role = "client"` needs `plc.address` and takes no `plc.listen`; `"server"` takes no `plc.address`.
 - `plc.listen` and `robot.listen` differ in their port.
 - A sweep covers at least 1 degree, takes less than `plc.scan_timeout_ms` and gives at least 20 profiles.
+- Where the robot carries the scanner, `robot.listen` and `robot.pose_address` (ur) or `robot.pose_listen` (fanuc, kawasaki)
+  are given, and `supply.path_timeout_ms` is less than `plc.scan_timeout_ms` and `robot.silence_max_s`.
 - In the middle of a sweep the scanner's middle ray goes down into the supply, or at most half its size beside it.
 - Ids differ among supplies and among parts.
 - Part files and their meshes exist; a part that is picked has at least one grasp.

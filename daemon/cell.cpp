@@ -22,6 +22,11 @@ plc::Options with_ids(const config::Config& config) {
   return options;
 }
 
+std::optional<drivers::robot::PoseSource> poses_of(const config::Config& config) {
+  if (config.carrier != config::Carrier::Robot) return std::nullopt;
+  return drivers::robot::PoseSource{config.pose_options()};
+}
+
 std::uint16_t to_u16(double value) { return static_cast<std::uint16_t>(std::clamp(std::lround(value), 0L, 65535L)); }
 }  // namespace
 
@@ -32,9 +37,16 @@ Cell::Cell(std::shared_ptr<const CellData> data, std::uint16_t boot_count)
       pivot_{data_->config.pivot},
       scanner_{data_->config.scanner_options()},
       robot_{data_->config.robot},
-      carrier_{pivot_},
-      sweep_{carrier_, scanner_} {
+      poses_{poses_of(data_->config)},
+      pivot_carrier_{pivot_},
+      robot_carrier_{poses_ ? std::make_optional<drivers::sweep::RobotCarrier>(robot_, *poses_) : std::nullopt},
+      sweep_{carrier(), scanner_} {
   robot_.withdraw(drivers::robot::NoPick::NotReady);
+}
+
+drivers::sweep::Carrier& Cell::carrier() {
+  if (robot_carrier_) return *robot_carrier_;
+  return pivot_carrier_;
 }
 
 void Cell::run(TimePoint now) {
@@ -43,6 +55,7 @@ void Cell::run(TimePoint now) {
   if (due(pivot_.deadline())) pivot_.on_deadline(now);
   if (due(scanner_.deadline())) scanner_.on_deadline(now);
   if (due(robot_.deadline())) robot_.on_deadline(now);
+  if (poses_ && due(poses_->deadline())) poses_->on_deadline(now);
   if (due(sweep_.deadline())) sweep_.on_deadline(now);
   // An event may cause others; a bound shows a ring of them as our error instead of a hang.
   int rounds = 0;
@@ -78,6 +91,12 @@ bool Cell::drain(TimePoint now) {
   bool any = hear_plc(now);
   while (auto event = pivot_.take_event()) on(*event, now), any = true;
   while (auto event = scanner_.take_event()) on(*event, now), any = true;
+  while (poses_) {
+    const auto event = poses_->take_event();
+    if (!event) break;
+    on(*event, now);
+    any = true;
+  }
   while (auto event = sweep_.take_event()) on(*event, now), any = true;
   while (auto event = robot_.take_event()) on(*event, now), any = true;
   return any;
@@ -85,7 +104,7 @@ bool Cell::drain(TimePoint now) {
 
 std::optional<TimePoint> Cell::deadline() const {
   return earlier(earlier(earlier(plc_.deadline(), pivot_.deadline()), earlier(scanner_.deadline(), robot_.deadline())),
-                 sweep_.deadline());
+                 earlier(sweep_.deadline(), poses_ ? poses_->deadline() : std::nullopt));
 }
 
 std::optional<DetectRequest> Cell::take_detect_request() { return std::exchange(detect_request_, std::nullopt); }
@@ -147,11 +166,14 @@ void Cell::update_ready(TimePoint now) {
   unsigned reasons = 0;
   const auto pivot = pivot_.state();
   const auto scanner = scanner_.state();
-  if (pivot != drivers::pivot::Session::State::Standing && pivot != drivers::pivot::Session::State::Moving)
+  if (!robot_carrier_ && pivot != drivers::pivot::Session::State::Standing &&
+      pivot != drivers::pivot::Session::State::Moving)
     reasons |= static_cast<unsigned>(NotReady::Pivot);
   if (scanner != drivers::scanner::State::Idle && scanner != drivers::scanner::State::Measuring)
     reasons |= static_cast<unsigned>(NotReady::Scanner);
-  if (!started_with_.robot_listen.empty() && !robot_.connected()) reasons |= static_cast<unsigned>(NotReady::Robot);
+  const bool poses_missing = poses_ && poses_->state() != drivers::robot::PoseState::Streaming;
+  if ((!started_with_.robot_listen.empty() && !robot_.connected()) || poses_missing)
+    reasons |= static_cast<unsigned>(NotReady::Robot);
   if (stopping_) reasons |= static_cast<unsigned>(NotReady::Stopping);
   plc_.set_not_ready(static_cast<std::uint16_t>(reasons), now);
 }
@@ -187,13 +209,19 @@ void Cell::begin_sweep(TimePoint now) {
   const auto& part = data_->knowledge_bases[recipe_];
   const Eigen::Vector2d half = supply.size_mm.head<2>() / 2;
   builder_.emplace(part.pixel_mm(), -half, half);
-  carrier_.set_latency(data_->config.pivot_latency);
+  pivot_carrier_.set_latency(data_->config.pivot_latency);
+  if (robot_carrier_) robot_carrier_->set_latency(data_->config.pose_latency);
+  sweep_.begin({.motion = motion_over(supply), .scanner_latency = data_->config.scanner_latency}, now);
+}
+
+drivers::sweep::Motion Cell::motion_over(const config::Supply& supply) const {
+  // The handshake's own deadline holds until the robot stands at the beginning.
+  if (robot_carrier_)
+    return drivers::sweep::RobotPath{supply.scan_path, data_->config.plc.scan_timeout, supply.path_timeout};
   const double positioning_speed_rad_s =
       std::max(supply.sweep_speed_rad_s, kPositioningShare * (module_ ? module_->velocity_max_rad_s : 0.0));
-  sweep_.begin({.motion = drivers::sweep::PivotSweep{supply.sweep_start, supply.sweep_end, supply.sweep_speed_rad_s,
-                                                     positioning_speed_rad_s},
-                .scanner_latency = data_->config.scanner_latency},
-               now);
+  return drivers::sweep::PivotSweep{supply.sweep_start, supply.sweep_end, supply.sweep_speed_rad_s,
+                                    positioning_speed_rad_s};
 }
 
 void Cell::start_detection(TimePoint now) {

@@ -14,6 +14,7 @@
 #include "drivers/robot/session.hpp"
 #include "drivers/scanner/any/scanner.hpp"
 #include "drivers/sweep/pivot_carrier.hpp"
+#include "drivers/sweep/robot_carrier.hpp"
 #include "drivers/sweep/sweep.hpp"
 #include "plc/session.hpp"
 #include "vision/depth_image.hpp"
@@ -29,6 +30,8 @@ class Cell {
   drivers::pivot::Session& pivot() { return pivot_; }
   drivers::scanner::Scanner& scanner() { return scanner_; }
   drivers::robot::Session& robot() { return robot_; }
+  /// Where the robot is; nothing unless it carries the scanner.
+  drivers::robot::PoseSource* poses() { return poses_ ? &*poses_ : nullptr; }
 
   /// Serves deadlines that have come, drains every session's events and moves the cycle on, until nothing happens any
   /// more.
@@ -58,6 +61,8 @@ class Cell {
  private:
   bool hear_plc(TimePoint now);
   bool drain(TimePoint now);
+  drivers::sweep::Carrier& carrier();
+  drivers::sweep::Motion motion_over(const config::Supply& supply) const;
   void apply(CellInput input, TimePoint now);
   void begin_sweep(TimePoint now);
   void start_detection(TimePoint now);
@@ -73,6 +78,7 @@ class Cell {
   void on(const drivers::pivot::Event& event, TimePoint now);
   void on(const drivers::scanner::Event& event, TimePoint now);
   void on(const drivers::robot::Event& event, TimePoint now);
+  void on(const drivers::robot::PoseEvent& event, TimePoint now);
   void on(drivers::sweep::Event& event, TimePoint now);
 
   const config::Config started_with_;  // what the sessions and links still run on
@@ -82,7 +88,9 @@ class Cell {
   drivers::pivot::Session pivot_;
   drivers::scanner::Scanner scanner_;
   drivers::robot::Session robot_;
-  drivers::sweep::PivotCarrier carrier_;
+  std::optional<drivers::robot::PoseSource> poses_;
+  drivers::sweep::PivotCarrier pivot_carrier_;
+  std::optional<drivers::sweep::RobotCarrier> robot_carrier_;  // instead of the pivot
   drivers::sweep::Sweep sweep_;
 
   CellState state_ = CellState::Idle;
@@ -90,7 +98,8 @@ class Cell {
   bool robot_lost_ = false;
   std::uint64_t robot_bad_lines_ = 0;
   std::optional<TimePoint> robot_bad_since_;
-  std::optional<plc::Alarm> pivot_alarm_, scanner_alarm_;  // standing, cleared when the device is ready again
+  std::optional<plc::Alarm> pivot_alarm_, scanner_alarm_,
+      poses_alarm_;  // standing, cleared when the device is ready again
   std::uint64_t cycle_id_ = 0;
   std::uint16_t pick_id_ = 0;
   plc::Alarm cycle_alarm_ = plc::Alarm::None;  // why FaultCycle

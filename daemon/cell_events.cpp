@@ -46,6 +46,17 @@ plc::Alarm alarm_of(const drivers::scanner::Failed& failed) {
   }
   return plc::Alarm::ScannerNoReply;
 }
+
+Transform<frame::Base, frame::Scanner> scanner_at(const config::Config& config,
+                                                  const drivers::sweep::CarrierPose& carrier) {
+  return std::visit(Overloaded{
+                        [&](const Angle& pivot) { return vision::scanner_at(config.mount, pivot); },
+                        [&](const Transform<frame::Base, frame::Flange>& T_base_flange) {
+                          return T_base_flange * config.T_flange_scanner;
+                        },
+                    },
+                    carrier);
+}
 }  // namespace
 
 void Cell::on(const plc::Event& event, TimePoint now) {
@@ -66,7 +77,8 @@ void Cell::on(const plc::Event& event, TimePoint now) {
                                static_cast<unsigned long long>(cycle_id_), request_.sequence, request_.part_id,
                                request_.supply_id);
                    apply(CellInput::Request, now);
-                   if (plc_.robot_clear()) {
+                   // A robot that carries the scanner is where it has to be.
+                   if (plc_.robot_clear() || robot_carrier_) {
                      apply(CellInput::RobotClear, now);
                    } else {
                      BINPICK_LOG(Info, "cell", "cycle %llu waits: the robot is not clear of the view",
@@ -87,6 +99,7 @@ void Cell::on(const plc::Event& event, TimePoint now) {
                  [&](const plc::ResetRaised&) { BINPICK_LOG(Notice, "cell", "reset by the PLC"); },
                  [&](const plc::ResultAcknowledged&) {},
                  [&](const plc::RobotClearChanged& changed) {
+                   if (robot_carrier_) return;
                    if (!changed.clear) cycle_alarm_ = plc::Alarm::RobotNotClear;
                    apply(changed.clear ? CellInput::RobotClear : CellInput::RobotEntered, now);
                  },
@@ -110,7 +123,7 @@ void Cell::on(const drivers::pivot::Event& event, TimePoint now) {
                 module_->position_max.in_deg(), Angle::rad(module_->velocity_max_rad_s).in_deg());
     alarm_off(pivot_alarm_, now);
   }
-  if (const auto news = carrier_.on(event)) sweep_.on_carrier(*news, now);
+  if (const auto news = pivot_carrier_.on(event); news && !robot_carrier_) sweep_.on_carrier(*news, now);
   if (const auto* failed = std::get_if<drivers::pivot::Failed>(&event)) {
     if (pivot_alarm_ && *pivot_alarm_ != alarm_of(*failed)) alarm_off(pivot_alarm_, now);
     pivot_alarm_ = alarm_of(*failed);
@@ -131,7 +144,21 @@ void Cell::on(const drivers::scanner::Event& event, TimePoint now) {
   }
 }
 
+void Cell::on(const drivers::robot::PoseEvent& event, TimePoint now) {
+  if (const auto* ready = std::get_if<drivers::robot::PoseReady>(&event)) {
+    BINPICK_LOG(Notice, "robot", "its poses come; their times are known within %.1f ms", in_ms(ready->uncertainty));
+    alarm_off(poses_alarm_, now);
+  }
+  if (const auto news = robot_carrier_->on(event)) sweep_.on_carrier(*news, now);
+  if (const auto* failed = std::get_if<drivers::robot::PoseFailed>(&event)) {
+    poses_alarm_ = plc::Alarm::RobotPosesLost;
+    device_failed(*poses_alarm_, "robot: " + failed->text, now);
+  }
+}
+
 void Cell::on(const drivers::robot::Event& event, TimePoint now) {
+  if (robot_carrier_)
+    if (const auto news = robot_carrier_->on(event)) sweep_.on_carrier(*news, now);
   std::visit(Overloaded{
                  [&](const drivers::robot::Connected&) {
                    BINPICK_LOG(Notice, "robot", "connected");
@@ -151,6 +178,7 @@ void Cell::on(const drivers::robot::Event& event, TimePoint now) {
                    robot_lost_ = true;
                    plc_.raise(plc::Alarm::RobotLost, now);
                  },
+                 [](const auto&) {},  // of the scan path: the carrier's
              },
              event);
 }
@@ -161,7 +189,7 @@ void Cell::on(drivers::sweep::Event& event, TimePoint now) {
           [&](const drivers::sweep::RegisteredProfile& registered) {
             if (state_ != CellState::Sweeping) return;
             const auto& config = data_->config;
-            const auto T_base_scanner = vision::scanner_at(config.mount, std::get<Angle>(registered.carrier));
+            const auto T_base_scanner = scanner_at(config, registered.carrier);
             const auto T_supply_scanner = config.supplies[supply_].T_base_supply.inverse() * T_base_scanner;
             points_supply_mm_.clear();
             vision::register_profile(registered.profile.x_mm, registered.profile.z_mm, T_supply_scanner,
@@ -181,8 +209,11 @@ void Cell::on(drivers::sweep::Event& event, TimePoint now) {
           },
           [&](const drivers::sweep::Failed& failed) {
             using Device = drivers::sweep::Failed::Device;
-            cycle_alarm_ = failed.device == Device::Carrier   ? pivot_alarm_.value_or(plc::Alarm::PivotModuleError)
+            cycle_alarm_ = failed.device == Device::Carrier && robot_carrier_
+                               ? poses_alarm_.value_or(plc::Alarm::RobotPathBroken)
+                           : failed.device == Device::Carrier ? pivot_alarm_.value_or(plc::Alarm::PivotModuleError)
                            : failed.device == Device::Scanner ? scanner_alarm_.value_or(plc::Alarm::ScannerNoReply)
+                           : robot_carrier_                   ? plc::Alarm::RobotPathBroken
                                                               : plc::Alarm::ScanTimeout;
             BINPICK_LOG(Warning, "cell", "cycle %llu: sweep failed: %s", static_cast<unsigned long long>(cycle_id_),
                         failed.text.c_str());

@@ -54,40 +54,74 @@ std::unique_ptr<link::CanLink> open_pivot(link::Loop& loop, Cell& cell) {
 
 Links::Links(link::Loop& loop, Cell& cell)
     : cell_{cell},
-      pivot_{open_pivot(loop, cell)},
+      pivot_{cell.poses() == nullptr ? open_pivot(loop, cell) : nullptr},
       scanner_{drivers::scanner::open_link(loop, cell.data().config.scanner_address,
                                            cell.data().config.scanner_listen_port, cell.scanner())} {
   open_plc(loop);
+  open_poses(loop);
   if (cell.data().config.robot_listen.empty()) return;  // the PLC forwards the movement
-  robot_.emplace(
-      loop, endpoint(cell.data().config.robot_listen, "robot.listen"),
-      link::ServerPeer{
-          .on_accept =
-              [this](link::ConnectionId id, const std::string& address, std::uint16_t, TimePoint now) {
-                if (!may_connect(cell_.data().config.robot_allow, address)) {
-                  BINPICK_LOG(Warning, "robot", "%s refused: not in robot.allow", address.c_str());
-                  return false;
-                }
-                // A robot that lost power never closed its old connection: the new one replaces it.
-                if (robot_connection_ != 0) cell_.robot().on_disconnected(now);
-                robot_connection_ = id;
-                cell_.robot().on_connected(now);
-                return true;
-              },
-          .on_bytes =
-              [this](link::ConnectionId id, ByteView bytes, TimePoint now) {
-                if (id == robot_connection_) cell_.robot().on_bytes(bytes, now);
-              },
-          .on_closed =
-              [this](link::ConnectionId id, TimePoint now) {
-                if (id != robot_connection_) return;
-                robot_connection_ = 0;
-                cell_.robot().on_disconnected(now);
-              },
-          .take_output =
-              [this](link::ConnectionId id) { return id == robot_connection_ ? cell_.robot().take_output() : Bytes{}; },
-          .wants_close = [this](link::ConnectionId id) { return id != robot_connection_; },
-      },
+  robot_.emplace(loop, endpoint(cell.data().config.robot_listen, "robot.listen"),
+                 one_robot(
+                     robot_connection_, [this](TimePoint now) { cell_.robot().on_connected(now); },
+                     [this](ByteView bytes, TimePoint now) { cell_.robot().on_bytes(bytes, now); },
+                     [this](TimePoint now) { cell_.robot().on_disconnected(now); },
+                     [this] { return cell_.robot().take_output(); }),
+                 link::TcpServerOptions{.connections_max = 2, .newest_wins = true});
+}
+
+/// A server of which one connection counts: a robot that lost power never closed its old one, so the new one replaces
+/// it.
+link::ServerPeer Links::one_robot(link::ConnectionId& counts, std::function<void(TimePoint)> on_connected,
+                                  std::function<void(ByteView, TimePoint)> on_bytes,
+                                  std::function<void(TimePoint)> on_disconnected, std::function<Bytes()> take_output) {
+  return {
+      .on_accept =
+          [this, &counts, on_connected, on_disconnected](link::ConnectionId id, const std::string& address,
+                                                         std::uint16_t, TimePoint now) {
+            if (!may_connect(cell_.data().config.robot_allow, address)) {
+              BINPICK_LOG(Warning, "robot", "%s refused: not in robot.allow", address.c_str());
+              return false;
+            }
+            if (counts != 0) on_disconnected(now);
+            counts = id;
+            on_connected(now);
+            return true;
+          },
+      .on_bytes =
+          [&counts, on_bytes](link::ConnectionId id, ByteView bytes, TimePoint now) {
+            if (id == counts) on_bytes(bytes, now);
+          },
+      .on_closed =
+          [&counts, on_disconnected](link::ConnectionId id, TimePoint now) {
+            if (id != counts) return;
+            counts = 0;
+            on_disconnected(now);
+          },
+      .take_output = [&counts, take_output](link::ConnectionId id) { return id == counts ? take_output() : Bytes{}; },
+      .wants_close = [&counts](link::ConnectionId id) { return id != counts; },
+  };
+}
+
+void Links::open_poses(link::Loop& loop) {
+  if (cell_.poses() == nullptr) return;
+  const auto& config = cell_.data().config;
+  drivers::robot::PoseSource& poses = *cell_.poses();
+  if (poses.cell_connects()) {
+    pose_client_.emplace(loop, endpoint(config.pose_address, "robot.pose_address"),
+                         link::StreamPeer{
+                             .on_connected = [&poses](TimePoint now) { poses.on_connected(now); },
+                             .on_bytes = [&poses](ByteView bytes, TimePoint now) { poses.on_bytes(bytes, now); },
+                             .on_disconnected = [&poses](TimePoint now) { poses.on_disconnected(now); },
+                             .take_output = [&poses] { return poses.take_output(); },
+                         });
+    return;
+  }
+  pose_server_.emplace(
+      loop, endpoint(config.pose_listen, "robot.pose_listen"),
+      one_robot(
+          pose_connection_, [&poses](TimePoint now) { poses.on_connected(now); },
+          [&poses](ByteView bytes, TimePoint now) { poses.on_bytes(bytes, now); },
+          [&poses](TimePoint now) { poses.on_disconnected(now); }, [&poses] { return poses.take_output(); }),
       link::TcpServerOptions{.connections_max = 2, .newest_wins = true});
 }
 
@@ -101,7 +135,8 @@ void Links::open_plc(link::Loop& loop) {
 
 void Links::on_deadline(TimePoint now) {
   const auto due = [&](std::optional<TimePoint> at) { return at && *at <= now; };
-  if (due(pivot_->deadline())) pivot_->on_deadline(now);
+  if (pivot_ && due(pivot_->deadline())) pivot_->on_deadline(now);
+  if (pose_client_ && due(pose_client_->deadline())) pose_client_->on_deadline(now);
   if (due(scanner_->deadline())) scanner_->on_deadline(now);
   if (!plc_client_) return;
   if (due(plc_client_->deadline())) plc_client_->on_deadline(now);
@@ -114,15 +149,22 @@ void Links::on_deadline(TimePoint now) {
 }
 
 std::optional<TimePoint> Links::deadline() const {
-  return earlier(earlier(pivot_->deadline(), scanner_->deadline()),
-                 plc_client_ ? plc_client_->deadline() : std::nullopt);
+  const auto devices = earlier(pivot_ ? pivot_->deadline() : std::nullopt, scanner_->deadline());
+  const auto robot = pose_client_ ? pose_client_->deadline() : std::nullopt;
+  return earlier(earlier(devices, robot), plc_client_ ? plc_client_->deadline() : std::nullopt);
 }
 
 void Links::flush(TimePoint now) {
   if (cell_.scanner().take_reopen()) scanner_->reopen(now);
   if (robot_ && cell_.robot().take_reopen() && robot_connection_ != 0) robot_->close(robot_connection_, now);
   if (plc_client_ && cell_.plc().take_reopen()) plc_client_->reopen(now);
-  pivot_->flush(now);
+  if (pivot_) pivot_->flush(now);
+  if (cell_.poses() != nullptr && cell_.poses()->take_reopen()) {
+    if (pose_client_) pose_client_->reopen(now);
+    if (pose_server_ && pose_connection_ != 0) pose_server_->close(pose_connection_, now);
+  }
+  if (pose_client_) pose_client_->flush(now);
+  if (pose_server_) pose_server_->flush(now);
   scanner_->flush(now);
   if (plc_server_) plc_server_->flush(now);
   if (plc_client_) plc_client_->flush(now);

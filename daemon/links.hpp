@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -22,16 +23,24 @@ class Links {
   void flush(TimePoint now);  ///< After Cell::run: sends what the sessions have to say.
 
  private:
+  drivers::link::ServerPeer one_robot(drivers::link::ConnectionId& counts, std::function<void(TimePoint)> on_connected,
+                                      std::function<void(ByteView, TimePoint)> on_bytes,
+                                      std::function<void(TimePoint)> on_disconnected,
+                                      std::function<Bytes()> take_output);
+  void open_poses(drivers::link::Loop& loop);
   void open_plc(drivers::link::Loop& loop);
 
   Cell& cell_;
   std::optional<drivers::link::TcpServer> plc_server_;  // one of the two, as plc.role says
   std::optional<drivers::link::TcpClient> plc_client_;
-  bool plc_connected_ = false;  // as last seen
-  std::string plc_trouble_;     // why not
-  std::unique_ptr<drivers::link::CanLink> pivot_;
+  bool plc_connected_ = false;                     // as last seen
+  std::string plc_trouble_;                        // why not
+  std::unique_ptr<drivers::link::CanLink> pivot_;  // null: the robot carries the scanner
   std::unique_ptr<drivers::link::DeviceLink> scanner_;
   std::optional<drivers::link::TcpServer> robot_;
-  drivers::link::ConnectionId robot_connection_ = 0;  // the one that counts; 0: none
+  drivers::link::ConnectionId robot_connection_ = 0;     // the one that counts; 0: none
+  std::optional<drivers::link::TcpClient> pose_client_;  // one of the two, where the robot carries the scanner
+  std::optional<drivers::link::TcpServer> pose_server_;
+  drivers::link::ConnectionId pose_connection_ = 0;
 };
 }  // namespace binpick::daemon

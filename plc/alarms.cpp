@@ -44,6 +44,13 @@ constexpr std::array kAlarms{
     AlarmText{Alarm::RobotBadLine, "robot sent a bad line",
               "The robot sent text that is not a command of the line protocol.",
               "Compare the robot's program with the one in docs/robots."},
+    AlarmText{Alarm::RobotPathBroken, "robot broke off the scan path",
+              "The robot, which carries the scanner, stopped on its path, was lost on it or did not end it in time.",
+              "Clear the stop at the robot's panel, move it out of the bin, start its program, then reset."},
+    AlarmText{
+        Alarm::RobotPosesLost, "robot's poses do not come",
+        "The robot carries the scanner, but where it is does not arrive (RTDE, or its background program).",
+        "Check [robot] pose_address or pose_listen, start the background program, look at the log for the reason."},
     AlarmText{Alarm::PlcLost, "PLC not connected", "No Modbus connection of the PLC for longer than allowed.",
               "Check network and PLC; the cell goes on by itself once the PLC writes again."},
     AlarmText{Alarm::PlcHeartbeatStopped, "PLC heartbeat stopped",

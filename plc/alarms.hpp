@@ -20,6 +20,8 @@ enum class Alarm : std::uint16_t {
   ScannerProfilesLost = 204,
   RobotLost = 300,
   RobotBadLine = 301,
+  RobotPathBroken = 302,  ///< It carries the scanner, and did not come to the end of its path.
+  RobotPosesLost = 303,   ///< It carries the scanner, and does not say where it is.
   PlcLost = 400,
   PlcHeartbeatStopped = 401,
   PlcSecondWriter = 402,

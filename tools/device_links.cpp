@@ -40,31 +40,36 @@ bool daemon_runs(const config::Config& config) {
   return connected;
 }
 
+std::unique_ptr<link::CanLink> DeviceLinks::open_pivot(const config::Config& config) {
+  if (config.carrier != config::Carrier::Pivot) return nullptr;
+  return link::open_can(
+      loop_, config.pivot_can, {{0x0A0U + config.pivot.module_id, 0x7FF}, {0x060U + config.pivot.module_id, 0x7FF}},
+      {
+          .on_up = [this](TimePoint now) { pivot_.on_link_up(now); },
+          .on_frame = [this](const link::CanFrame& frame, TimePoint at) { pivot_.on_frame(frame, at); },
+          .on_down = [this](const std::string& why, TimePoint now) { pivot_.on_link_down(why, now); },
+          .take_frames = [this] { return pivot_.take_frames(); },
+      },
+      config.pivot_can_listen_port);
+}
+
 DeviceLinks::DeviceLinks(const config::Config& config, bool may_move)
     : pivot_{pivot_options(config, may_move)},
       scanner_{config.scanner_options()},
-      pivot_link_{link::open_can(
-          loop_, config.pivot_can, {{0x0A0U + config.pivot.module_id, 0x7FF}, {0x060U + config.pivot.module_id, 0x7FF}},
-          {
-              .on_up = [this](TimePoint now) { pivot_.on_link_up(now); },
-              .on_frame = [this](const link::CanFrame& frame, TimePoint at) { pivot_.on_frame(frame, at); },
-              .on_down = [this](const std::string& why, TimePoint now) { pivot_.on_link_down(why, now); },
-              .take_frames = [this] { return pivot_.take_frames(); },
-          },
-          config.pivot_can_listen_port)},
+      pivot_link_{open_pivot(config)},
       scanner_link_{drivers::scanner::open_link(loop_, config.scanner_address, config.scanner_listen_port, scanner_)} {}
 
 TimePoint DeviceLinks::turn(TimePoint now, TimePoint until) {
   const auto due = [&](std::optional<TimePoint> at) { return at && *at <= now; };
   if (due(pivot_.deadline())) pivot_.on_deadline(now);
   if (due(scanner_.deadline())) scanner_.on_deadline(now);
-  if (due(pivot_link_->deadline())) pivot_link_->on_deadline(now);
+  if (pivot_link_ && due(pivot_link_->deadline())) pivot_link_->on_deadline(now);
   if (due(scanner_link_->deadline())) scanner_link_->on_deadline(now);
   if (scanner_.take_reopen()) scanner_link_->reopen(now);
-  pivot_link_->flush(now);
+  if (pivot_link_) pivot_link_->flush(now);
   scanner_link_->flush(now);
   const auto sessions = earlier(pivot_.deadline(), scanner_.deadline());
-  const auto links = earlier(pivot_link_->deadline(), scanner_link_->deadline());
+  const auto links = earlier(pivot_link_ ? pivot_link_->deadline() : std::nullopt, scanner_link_->deadline());
   return loop_.wait(earlier(earlier(sessions, links), until));
 }
 }  // namespace binpick::tools

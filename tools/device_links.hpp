@@ -34,10 +34,12 @@ class DeviceLinks {
   std::string scanner_trouble() const { return scanner_link_->last_error(); }
 
  private:
+  std::unique_ptr<drivers::link::CanLink> open_pivot(const config::Config& config);
+
   drivers::link::Loop loop_;
   drivers::pivot::Session pivot_;
   drivers::scanner::Scanner scanner_;
-  std::unique_ptr<drivers::link::CanLink> pivot_link_;
+  std::unique_ptr<drivers::link::CanLink> pivot_link_;  // null: the robot carries the scanner
   std::unique_ptr<drivers::link::DeviceLink> scanner_link_;
 };
 }  // namespace binpick::tools

@@ -59,7 +59,8 @@ int probe(const std::string& cell_path) {
   DeviceLinks devices{*config, false};
 
   std::string pivot = "no answer", scanner;
-  bool pivot_good = false, scanner_good = false;
+  const bool has_pivot = config->carrier == config::Carrier::Pivot;
+  bool pivot_good = !has_pivot, scanner_good = false;
   const SystemClock clock;
   TimePoint now = clock.now();
   const TimePoint began = now;
@@ -95,7 +96,10 @@ int probe(const std::string& cell_path) {
   }
   if (scanner.empty()) scanner = "no connection: " + devices.scanner_trouble();
 
-  std::printf("pivot    %s: %s\n", config->pivot_can.c_str(), pivot.c_str());
+  if (has_pivot)
+    std::printf("pivot    %s: %s\n", config->pivot_can.c_str(), pivot.c_str());
+  else
+    std::printf("pivot    none: the robot carries the scanner\n");
   std::printf("scanner  %s: %s\n", config->scanner_address.c_str(), scanner.c_str());
   bool robot_good = true;
   if (config->robot_listen.empty()) {

@@ -55,6 +55,11 @@ int scan(const std::string& cell_path, const std::string& out_path, int supply_i
                  cell_path.c_str(), cell_path.c_str());
     return 2;
   }
+  if (config->carrier == config::Carrier::Robot) {
+    std::fprintf(stderr, "binpick: the robot carries the scanner of %s; let the PLC ask the daemon for a scan\n",
+                 cell_path.c_str());
+    return 1;
+  }
   const config::Supply* supply = nullptr;
   for (const auto& candidate : config->supplies)
     if (supply_id == 0 || candidate.id == supply_id) {

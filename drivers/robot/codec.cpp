@@ -63,6 +63,15 @@ std::string_view separator(const Format& format, std::size_t i) {
   return i == 5 || i == 11 ? format.pose_break : std::string_view{","};
 }
 
+struct Word {
+  std::string_view text;
+  Request::Kind kind;
+};
+constexpr std::array kWords{Word{"hello", Request::Kind::Hello},  Word{"fetch", Request::Kind::Fetch},
+                            Word{"done", Request::Kind::Done},    Word{"failed", Request::Kind::Failed},
+                            Word{"begin", Request::Kind::Begin},  Word{"end", Request::Kind::End},
+                            Word{"broken", Request::Kind::Broken}};
+
 constexpr bool is_integer(std::size_t i) { return i < 6 || i >= 18; }
 
 /// A whole number of 0 … 65535, or a decimal fraction; nullopt for anything else.
@@ -88,9 +97,9 @@ std::string to_string(const BadLine& error) {
     case BadLine::Kind::NotText:
       return "bytes that are no text";
     case BadLine::Kind::UnknownWord:
-      return "unknown request; known: hello, fetch, done ID, failed ID";
+      return "unknown request; known: hello, fetch, done ID, failed ID, begin ID, end ID, broken ID";
     case BadLine::Kind::BadNumber:
-      return "pick id is missing or outside 1 ... 65535";
+      return "the number is missing or outside 1 ... 65535";
     case BadLine::Kind::TooManyWords:
       return "words behind the request";
   }
@@ -103,31 +112,21 @@ Expected<Request, BadLine> decode_request(std::string_view line) {
     if (c < ' ' || c > '~') return unexpected(BadLine{BadLine::Kind::NotText});
   const auto words = split(line);
   if (words.empty()) return unexpected(BadLine{BadLine::Kind::UnknownWord});
-  const bool report = words[0] == "done" || words[0] == "failed";
-  if (!report && words[0] != "hello" && words[0] != "fetch") return unexpected(BadLine{BadLine::Kind::UnknownWord});
-  if (words.size() > (report ? 2U : 1U)) return unexpected(BadLine{BadLine::Kind::TooManyWords});
-  if (!report) return Request{words[0] == "hello" ? Request::Kind::Hello : Request::Kind::Fetch, 0};
+  const auto word = std::ranges::find(kWords, words[0], &Word::text);
+  if (word == kWords.end()) return unexpected(BadLine{BadLine::Kind::UnknownWord});
+  Request request{word->kind, 0};
+  const bool has_id = request.is_report() || request.is_of_scan();
+  if (words.size() > (has_id ? 2U : 1U)) return unexpected(BadLine{BadLine::Kind::TooManyWords});
+  if (!has_id) return request;
   const auto id = words.size() == 2 ? read_id(words[1]) : std::nullopt;
   if (!id) return unexpected(BadLine{BadLine::Kind::BadNumber});
-  return Request{words[0] == "done" ? Request::Kind::Done : Request::Kind::Failed, *id};
+  request.pick_id = *id;
+  return request;
 }
 
 std::string encode(const Request& request, Dialect dialect) {
-  std::string line;
-  switch (request.kind) {
-    case Request::Kind::Hello:
-      line = "hello";
-      break;
-    case Request::Kind::Fetch:
-      line = "fetch";
-      break;
-    case Request::Kind::Done:
-      line = "done " + std::to_string(request.pick_id);
-      break;
-    case Request::Kind::Failed:
-      line = "failed " + std::to_string(request.pick_id);
-      break;
-  }
+  std::string line{std::ranges::find(kWords, request.kind, &Word::kind)->text};
+  if (request.is_report() || request.is_of_scan()) line += ' ' + std::to_string(request.pick_id);
   return line.append(format_of(dialect).request_end);
 }
 

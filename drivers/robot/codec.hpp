@@ -29,13 +29,18 @@ inline constexpr std::size_t kReplyBytesMax = 512;
 /// What a line asks for.
 struct Request {
   enum class Kind {
-    Hello,  ///< "hello": what is on record? Changes nothing.
-    Fetch,  ///< "fetch"
-    Done,   ///< "done 17"
-    Failed  ///< "failed 17"
+    Hello,   ///< "hello": what is on record? Changes nothing.
+    Fetch,   ///< "fetch"
+    Done,    ///< "done 17"
+    Failed,  ///< "failed 17"
+    // Of a robot that carries the scanner:
+    Begin,  ///< "begin 4": it stands at the start of the path of scan 4.
+    End,    ///< "end 4": it stands at its end.
+    Broken  ///< "broken 4": it stopped on the way.
   } kind = Kind::Hello;
-  std::uint16_t pick_id = 0;  ///< Of a report, 1 … 65535.
+  std::uint16_t pick_id = 0;  ///< Of a report, or the number of a scan: 1 … 65535.
   bool is_report() const { return kind == Kind::Done || kind == Kind::Failed; }
+  bool is_of_scan() const { return kind == Kind::Begin || kind == Kind::End || kind == Kind::Broken; }
 };
 
 struct BadLine {
@@ -69,12 +74,15 @@ enum class Status : std::uint16_t {
   Pick = 1,         ///< Fields 3 … 18 hold.
   ReportTaken = 2,  ///< The report is on record (also when it came twice).
   Hello = 3,
+  Scan = 4,  ///< Carry the scanner: field "pick id" is the scan's number, field "part" the path's.
+  Go = 5,    ///< The scanner measures: move along the path now.
   SupplyEmpty = 10,
   NothingFound = 11,
   NotReachable = 12,
   Fault = 40,
   UnknownPick = 50,  ///< A report of a pick that is not open: forget it, fetch.
   BadRequest = 51,   ///< The line was not understood.
+  UnknownScan = 52,  ///< The scan is not wanted any more: stay clear, fetch.
 };
 
 enum class Outcome : std::uint16_t { None = 0, Done = 1, Failed = 2 };

@@ -31,6 +31,13 @@ struct Session::Impl {
   std::uint16_t reported_id = 0;
   Outcome outcome = Outcome::None;
 
+  struct Path {
+    std::uint16_t scan, number;
+    bool begun = false, may_go = false;
+  };
+  std::optional<Path> path;         // that the robot is to run, or runs
+  std::uint16_t path_ended_id = 0;  // the last one that came to its end: its report may come twice
+
   Reply reply(Status status) const { return {status, {}, reported_id, outcome}; }
 
   Reply answer(const Request& request) {
@@ -40,6 +47,13 @@ struct Session::Impl {
       Reply hello = reply(Status::Hello);
       hello.pick.pick_id = offered ? offered->pick_id : fetched_id;
       return hello;
+    }
+    if (request.is_of_scan()) return on_path(request);
+    if (path) {
+      Reply scan = reply(Status::Scan);
+      scan.pick.pick_id = path->scan;
+      scan.pick.part_id = path->number;
+      return scan;
     }
     if (!offered) return reply(static_cast<Status>(reason));
     fetched_id = offered->pick_id;
@@ -71,6 +85,29 @@ struct Session::Impl {
     Reply taken = reply(Status::ReportTaken);  // a repetition is answered by the outcome that stands
     taken.pick.pick_id = report.pick_id;
     return taken;
+  }
+
+  Reply on_path(const Request& said) {
+    const bool is_wanted = path && path->scan == said.pick_id;
+    const bool again = said.kind == Request::Kind::End && said.pick_id == path_ended_id;
+    Reply answer = reply(again ? Status::ReportTaken : Status::UnknownScan);
+    answer.pick.pick_id = said.pick_id;
+    if (!is_wanted) return answer;
+    if (said.kind == Request::Kind::Begin) {
+      if (!std::exchange(path->begun, true)) events.push_back(PathBegun{});
+      answer.status = path->may_go ? Status::Go : Status::NotReady;
+      return answer;
+    }
+    // An end without a beginning, or before it was let go, is none: nothing was measured.
+    const bool ended = said.kind == Request::Kind::End && path->may_go;
+    if (ended) path_ended_id = path->scan;
+    path.reset();
+    if (ended)
+      events.push_back(PathEnded{});
+    else
+      events.push_back(PathBroken{});
+    answer.status = Status::ReportTaken;
+    return answer;
   }
 
   void on_line(const Expected<std::string, BadLine>& line) {
@@ -155,6 +192,17 @@ void Session::offer(const Pick& pick) {
     impl_->outcome = Outcome::None;
   }
 }
+
+void Session::ask_path(std::uint16_t scan, std::uint16_t path) {
+  impl_->path = Impl::Path{.scan = scan, .number = path};
+  if (impl_->path_ended_id == scan) impl_->path_ended_id = 0;  // numbers come round after 65535
+}
+
+void Session::let_go() {
+  if (impl_->path) impl_->path->may_go = true;
+}
+
+void Session::forget_path() { impl_->path.reset(); }
 
 void Session::withdraw(NoPick reason) {
   impl_->offered.reset();

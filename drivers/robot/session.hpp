@@ -45,7 +45,11 @@ struct Reported {
 struct Lost {
   std::string text;
 };
-using Event = std::variant<Connected, Fetched, Reported, Lost>;
+/// Of the scan that was asked for. The robot stands at the start of the path, and waits for let_go().
+struct PathBegun {};
+struct PathEnded {};
+struct PathBroken {};  ///< The robot stopped on the way, and says so.
+using Event = std::variant<Connected, Fetched, Reported, Lost, PathBegun, PathEnded, PathBroken>;
 
 /// One robot. What was offered and reported is on record beyond a connection, so that a robot that reconnects, or whose
 /// program starts anew at any point, finds it again. Each line is answered by one group of numbers (codec.hpp).
@@ -67,6 +71,12 @@ class Session {
   /// An offer of the same id again changes what the next fetch gets.
   void offer(const Pick& pick);
   void withdraw(NoPick reason);
+
+  /// Where the robot carries the scanner: the next fetch is answered by this scan instead, until it has ended. `scan`
+  /// is its number, 1 … 65535; `path` the one that the robot's program knows.
+  void ask_path(std::uint16_t scan, std::uint16_t path);
+  void let_go();       ///< The scanner measures: the robot may move along the path.
+  void forget_path();  ///< The scan is not wanted any more; the robot is told when it next says something of it.
 
  private:
   struct Impl;

@@ -39,6 +39,7 @@ class Carrier {
   virtual void stop(TimePoint now) = 0;
   virtual Duration prepare_max() const = 0;  ///< To the start, at most.
   virtual Duration path_max() const = 0;     ///< From there to the end, at most.
+  virtual std::string overdue() const = 0;   ///< What to say when it took longer.
   /// The latest time that at() may know of.
   virtual std::optional<TimePoint> newest() const = 0;
   virtual std::optional<CarrierPose> at(TimePoint at) const = 0;

@@ -22,6 +22,7 @@ class PivotCarrier final : public Carrier {
   void stop(TimePoint now) override { pivot_.stop(now); }
   Duration prepare_max() const override;
   Duration path_max() const override;
+  std::string overdue() const override { return "the sweep did not come to its end in time"; }
   std::optional<TimePoint> newest() const override { return track_.newest(); }
   std::optional<CarrierPose> at(TimePoint at) const override;
 

@@ -17,7 +17,7 @@ void Sweep::begin(const Plan& plan, TimePoint now) {
   waiting_.clear();
   events_.clear();
   done_ = {};
-  failure_ = {Failed::Device::None, "the sweep did not come to its end in time"};
+  failure_ = {};
   move_began_.reset();
   move_ended_.reset();
   last_profile_at_.reset();
@@ -77,6 +77,7 @@ void Sweep::on_deadline(TimePoint now) {
     apply(Input::DeviceFailed, now);
     return;
   }
+  failure_ = {Failed::Device::None, carrier_.overdue()};
   apply(Input::Deadline, now);
 }
 

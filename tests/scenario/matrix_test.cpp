@@ -3,6 +3,7 @@
 
 #include "tests/support/cell_file.hpp"
 #include "tests/support/emulated_cell.hpp"
+#include "tests/support/scan_paths.hpp"
 #include "tests/support/scenes.hpp"
 
 /// Every device of the trade's cells in every combination: each one whole pick, from the PLC's request to the robot's
@@ -11,7 +12,9 @@ namespace binpick::support {
 namespace {
 struct Combination {
   const char* scanner;
-  const char* word_order;  ///< The make of PLC: s7 or logix.
+  std::uint16_t scan_path;  ///< 0: on the pivot; else the robot carries it.
+  const char* word_order;   ///< The make of PLC: s7 or logix.
+  const char* plc_role;     ///< Of the daemon.
   const char* robot;
 };
 
@@ -25,7 +28,9 @@ Tolerance tolerance_of(const Combination& c) {
 CellFile file_of(const Combination& c) {
   CellFile file;
   file.scanner = c.scanner;
+  file.scan_path = c.scan_path;
   file.word_order = c.word_order;
+  file.plc_role = c.plc_role;
   file.robot = c.robot;
   file.parts = {file.scanner == "lms400" ? "track_link" : "contact_bridge"};
   return file;
@@ -69,14 +74,18 @@ namespace {
 std::vector<Combination> all() {
   std::vector<Combination> combinations;
   for (const char* scanner : {"lms400", "lps36"})
-    for (const char* robot : {"ur", "fanuc", "kawasaki"})
-      for (const char* word_order : {"s7", "logix"}) combinations.push_back({scanner, word_order, robot});
+    for (const std::uint16_t path : {std::uint16_t{0}, kLinearPath, kPanPath})
+      for (const char* robot : {"ur", "fanuc", "kawasaki"})
+        for (const char* word_order : {"s7", "logix"})
+          for (const char* role : {"server", "client"})
+            combinations.push_back({scanner, path, word_order, role, robot});
   return combinations;
 }
 }  // namespace
 
 INSTANTIATE_TEST_SUITE_P(All, Matrix, testing::ValuesIn(all()), [](const auto& one) {
   const Combination& c = one.param;
-  return std::string{c.scanner} + "_" + c.robot + "_" + c.word_order;
+  const char* carrier = c.scan_path == 0 ? "pivot" : c.scan_path == kLinearPath ? "linear" : "pan";
+  return std::string{c.scanner} + "_" + carrier + "_" + c.robot + "_" + c.word_order + "_" + c.plc_role;
 });
 }  // namespace binpick::support

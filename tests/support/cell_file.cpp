@@ -32,7 +32,9 @@ Layout layout_of(const CellFile& file) {
 void write_scanner(std::ostream& out, const CellFile& file) {
   out << "[scanner]\nmodel = \"" << file.scanner << "\"\naddress = \"127.0.0.1:" << file.scanner_port
       << "\"\nlatency_ms = " << file.scanner_latency_ms
-      << "\nT_pivot_scanner = { xyz_mm = [60, 0, 0], rpy_deg = [180, -90, 0] }\n";
+      << (file.scan_path == 0
+              ? "\nT_pivot_scanner = { xyz_mm = [60, 0, 0], rpy_deg = [180, -90, 0] }\n"
+              : "\ncarrier = \"robot\"\nT_flange_scanner = { xyz_mm = [0, 80, 120], rpy_deg = [0, 0, 0] }\n");
   if (file.scanner == "lms400")
     out << "frequency_hz = " << file.frequency_hz << "\nresolution_deg = " << file.resolution_deg
         << "\nstart_deg = 70\nrange_deg = 40\n";
@@ -47,19 +49,26 @@ std::string to_toml(const CellFile& file) {
   out << "[cell]\nname = \"test\"\nstate_dir = \"" << file.state_dir << "\"\npicture_dir = \"" << file.picture_dir
       << "\"\n\n[plc]\nrole = \"" << file.plc_role << (file.plc_role == "client" ? "\"\naddress" : "\"\nlisten")
       << " = \"127.0.0.1:" << file.plc_port << "\"\nword_order = \"" << file.word_order << "\"\npose_convention = \""
-      << file.robot << "\"\nallow = []\ndetect_timeout_ms = " << file.detect_timeout_ms
-      << "\n\n[pivot]\ncan = \"cannelloni://127.0.0.1:" << file.can_port
-      << "\"\ncan_listen_port = " << file.can_listen_port << "\nmodule_id = 12\nT_base_pivot = { xyz_mm = [1200, 0, "
-      << layout.pivot_height_mm << "], rpy_deg = [0, 90, 0] }\n\n";
+      << file.robot << "\"\nallow = []\ndetect_timeout_ms = " << file.detect_timeout_ms << "\n\n";
+  if (file.scan_path == 0)
+    out << "[pivot]\ncan = \"cannelloni://127.0.0.1:" << file.can_port
+        << "\"\ncan_listen_port = " << file.can_listen_port << "\nmodule_id = 12\nT_base_pivot = { xyz_mm = [1200, 0, "
+        << layout.pivot_height_mm << "], rpy_deg = [0, 90, 0] }\n\n";
   write_scanner(out, file);
   out << "\n[robot]\ndialect = \"" << file.robot << "\"\nsilence_max_s = 5\nlisten = \""
-      << (file.robot_port == 0 ? "" : "127.0.0.1:" + std::to_string(file.robot_port)) << "\"\nallow = []\n\n"
-      << "[reach]\ntilt_max_deg = " << file.tilt_max_deg << "\n\n[detection]\nthreads = 2\ndeadline_ms = 4500\n\n"
+      << (file.robot_port == 0 ? "" : "127.0.0.1:" + std::to_string(file.robot_port)) << "\"\nallow = []\n";
+  if (file.scan_path != 0)
+    out << (file.robot == "ur" ? "pose_address" : "pose_listen")
+        << " = \"127.0.0.1:30004\"\npose_latency_ms = " << file.pose_latency_ms << "\n";
+  out << "\n[reach]\ntilt_max_deg = " << file.tilt_max_deg << "\n\n[detection]\nthreads = 2\ndeadline_ms = 4500\n\n"
       << "[[supply]]\nid = 1\nname = \"lattice box\"\nsize_mm = " << layout.size_mm << "\n"
-      << "T_base_supply = { xyz_mm = [1200, 0, 0], rpy_deg = [0, 0, 0] }\nsweep_start_deg = " << -layout.sweep_deg
-      << "\nsweep_end_deg = " << layout.sweep_deg << "\n"
-      << "sweep_speed_deg_s = " << (file.scanner == "lms400" ? file.sweep_speed_deg_s : file.sweep_speed_deg_s * 0.4)
-      << "\n";
+      << "T_base_supply = { xyz_mm = [1200, 0, 0], rpy_deg = [0, 0, 0] }\n";
+  if (file.scan_path != 0)
+    out << "scan_path = " << file.scan_path << "\npath_timeout_ms = 4500\n";
+  else
+    out << "sweep_start_deg = " << -layout.sweep_deg << "\nsweep_end_deg = " << layout.sweep_deg
+        << "\nsweep_speed_deg_s = "
+        << (file.scanner == "lms400" ? file.sweep_speed_deg_s : file.sweep_speed_deg_s * 0.4) << "\n";
   int id = 0;
   for (const auto& part : file.parts)
     out << "\n[[part]]\nid = " << ++id << "\nfile = \"" << BINPICK_TEST_PARTS << "/" << part

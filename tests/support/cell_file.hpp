@@ -11,6 +11,7 @@ namespace binpick::support {
 /// What tests vary in a cell file; the rest is one cell: an LMS 400 over a lattice box, or an LPS 36 over a small box.
 struct CellFile {
   std::string scanner = "lms400";  ///< scanner.model; size and place of the supply and the sweep go with it.
+  std::uint16_t scan_path = 0;     ///< Other than 0: the robot carries the scanner, along this path (scan_paths.hpp).
   std::string word_order = "s7";
   std::string plc_role = "server";                  ///< plc.role: what the daemon is.
   std::string robot = "ur";                         ///< robot.dialect and plc.pose_convention.
@@ -21,6 +22,7 @@ struct CellFile {
   double frequency_hz = 360;
   double resolution_deg = 0.25;
   double scanner_latency_ms = 0;
+  double pose_latency_ms = 0;  ///< Where the robot carries the scanner.
   int detect_timeout_ms = 5000;
   std::string state_dir;
   std::string picture_dir;

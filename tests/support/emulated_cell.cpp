@@ -1,6 +1,7 @@
 #include "tests/support/emulated_cell.hpp"
 
 #include "base/check.hpp"
+#include "tests/support/scan_paths.hpp"
 
 namespace binpick::support {
 namespace {
@@ -23,6 +24,24 @@ emulators::PivotOptions pivot_options(const config::Config& config, std::uint64_
 emulators::RobotOptions robot_options(const config::Config& config) {
   emulators::RobotOptions options;
   options.dialect = config.robot.dialect;
+  if (config.carrier == config::Carrier::Robot) options.paths = scan_paths(config);
+  return options;
+}
+
+emulators::RtdeDevice::Options rtde_options(std::uint64_t seed, const emulators::PoseClock& clock) {
+  emulators::RtdeDevice::Options options;
+  options.clock = clock;
+  options.T_flange_tcp.iso.translation() = Eigen::Vector3d{0, 0, 180};
+  options.seed = seed;
+  return options;
+}
+
+emulators::PoseSender::Options pose_options(const config::Config& config, std::uint64_t seed,
+                                            const emulators::PoseClock& clock) {
+  emulators::PoseSender::Options options;
+  options.clock = clock;
+  options.dialect = config.robot.dialect;
+  options.seed = seed;
   return options;
 }
 
@@ -44,7 +63,8 @@ emulators::LightSection light_section(const config::Config& config, std::uint64_
 }
 }  // namespace
 
-EmulatedCell::EmulatedCell(std::shared_ptr<const daemon::CellData> data, emulators::World scene, std::uint64_t seed)
+EmulatedCell::EmulatedCell(std::shared_ptr<const daemon::CellData> data, emulators::World scene, std::uint64_t seed,
+                           const emulators::PoseClock& robot_clock)
     : world{std::move(scene)},
       pivot{pivot_options(data->config, seed)},
       scanner{emulators::ScannerView{world, where_scanner(data->config), noise(seed)}},
@@ -52,21 +72,28 @@ EmulatedCell::EmulatedCell(std::shared_ptr<const daemon::CellData> data, emulato
             {.hi = data->config.scanner_model == config::ScannerModel::Lps36Hi, .seed = seed}},
       plc{plc_options(data->config)},
       robot{robot_options(data->config)},
+      rtde{[this](TimePoint at) { return robot.flange_at(at); }, rtde_options(seed, robot_clock)},
+      pose_sender{[this](TimePoint at) { return robot.flange_at(at); }, pose_options(data->config, seed, robot_clock)},
       data_{std::move(data)},
       plc_wire_{plc_wire()},
       scanner_wire_{scanner_wire()},
-      robot_wire_{robot_wire()} {
+      robot_wire_{robot_wire()},
+      rtde_wire_{rtde_wire()},
+      pose_wire_{pose_wire()} {
   start_daemon();
 }
 
 emulators::WhereScanner EmulatedCell::where_scanner(const config::Config& config) {
+  if (config.carrier == config::Carrier::Robot)
+    return emulators::on_flange(config.supplies.front().T_base_supply, config.T_flange_scanner,
+                                [this](TimePoint at) { return robot.flange_at(at); });
   return emulators::on_pivot(scanner_place(config), [this](TimePoint at) { return pivot.angle_at(at); });
 }
 
 void EmulatedCell::start_daemon() {
   cell_ = std::make_unique<daemon::Cell>(data_, ++boot_count_);
   can_up_ = false;
-  udp_up_at_ = now_;
+  if (cell_->scanner().by_datagrams()) udp_up_at_ = now_;
 }
 
 void EmulatedCell::kill_daemon() {
@@ -142,7 +169,39 @@ Wire EmulatedCell::robot_wire() {
           }};
 }
 
+namespace {
+Wire::End pose_end(std::unique_ptr<daemon::Cell>& cell, bool cell_connects) {
+  return {
+      .there =
+          [&cell, cell_connects] {
+            return cell && cell->poses() != nullptr && cell->poses()->cell_connects() == cell_connects;
+          },
+      .on_connected = [&cell](TimePoint t) { cell->poses()->on_connected(t); },
+      .on_bytes = [&cell](ByteView b, TimePoint t) { cell->poses()->on_bytes(b, t); },
+      .on_disconnected = [&cell](TimePoint t) { cell->poses()->on_disconnected(t); },
+      .take_output = [&cell] { return cell->poses()->take_output(); },
+      .wants_close = [&cell] { return cell->poses()->take_reopen(); },
+  };
+}
+
+template <class Sender>
+Wire::End sender_end(Sender& sender) {
+  return {
+      .there = [&sender] { return sender.wants_link(); },
+      .on_connected = [&sender](TimePoint t) { sender.on_connected(t); },
+      .on_bytes = [&sender](ByteView b, TimePoint t) { sender.on_bytes(b, t); },
+      .on_disconnected = [&sender](TimePoint t) { sender.on_disconnected(t); },
+      .take_output = [&sender] { return sender.take_output(); },
+      .wants_close = [&sender] { return sender.wants_close(); },
+  };
+}
+}  // namespace
+
+Wire EmulatedCell::rtde_wire() { return {pose_end(cell_, true), sender_end(rtde)}; }
+Wire EmulatedCell::pose_wire() { return {pose_end(cell_, false), sender_end(pose_sender)}; }
+
 bool EmulatedCell::pump_frames() {
+  if (cell_ && cell_->poses() != nullptr) return false;  // no pivot
   if (cell_ && !can_up_) {
     can_up_ = true;
     cell_->pivot().on_link_up(now_);
@@ -185,6 +244,8 @@ void EmulatedCell::pump() {
     moved |= plc_wire_.pump(now_);
     moved |= scanner_wire_.pump(now_);
     moved |= robot_wire_.pump(now_);
+    moved |= rtde_wire_.pump(now_);
+    moved |= pose_wire_.pump(now_);
     if (cell_) {
       cell_->run(now_);
       if (auto request = cell_->take_detect_request()) {
@@ -215,12 +276,16 @@ void EmulatedCell::serve_deadlines() {
   if (due(lps36.deadline())) lps36.on_deadline(now_);
   if (due(plc.deadline())) plc.on_deadline(now_);
   if (due(robot.deadline())) robot.on_deadline(now_);
+  if (due(rtde.deadline())) rtde.on_deadline(now_);
+  if (due(pose_sender.deadline())) pose_sender.on_deadline(now_);
 }
 
 std::optional<TimePoint> EmulatedCell::next_deadline() const {
   auto next = earlier(earlier(pivot.deadline(), scanner.deadline()), earlier(plc.deadline(), robot.deadline()));
   next = earlier(next, earlier(plc_wire_.deadline(), earlier(scanner_wire_.deadline(), robot_wire_.deadline())));
+  next = earlier(next, earlier(rtde_wire_.deadline(), pose_wire_.deadline()));
   next = earlier(next, earlier(lps36.deadline(), udp_up_at_));
+  next = earlier(next, earlier(rtde.deadline(), pose_sender.deadline()));
   if (cell_) next = earlier(next, cell_->deadline());
   if (looking_ && !worker_hangs) next = earlier(next, looked_at_);
   return next;

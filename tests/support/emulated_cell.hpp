@@ -11,7 +11,9 @@
 #include "daemon/cell.hpp"
 #include "tests/emulators/pivot/pivot.hpp"
 #include "tests/emulators/plc/plc.hpp"
+#include "tests/emulators/robot/pose_sender.hpp"
 #include "tests/emulators/robot/robot.hpp"
+#include "tests/emulators/robot/rtde_device.hpp"
 #include "tests/emulators/scanner/lms400_device.hpp"
 #include "tests/emulators/scanner/lps36_view.hpp"
 #include "tests/emulators/scanner/scanner_view.hpp"
@@ -24,8 +26,9 @@ namespace binpick::support {
 class EmulatedCell {
  public:
   /// The emulated PLC speaks the word order and the convention of the cell file, the robot its dialect. The daemon is
-  /// started.
-  EmulatedCell(std::shared_ptr<const daemon::CellData> data, emulators::World scene, std::uint64_t seed = 1);
+  /// started. `robot_clock` stamps the robot's poses.
+  EmulatedCell(std::shared_ptr<const daemon::CellData> data, emulators::World scene, std::uint64_t seed = 1,
+               const emulators::PoseClock& robot_clock = {});
 
   emulators::World world;
   emulators::Pivot pivot;
@@ -33,6 +36,9 @@ class EmulatedCell {
   emulators::Lps36 lps36;
   emulators::Plc plc;
   emulators::Robot robot;
+  // Where the robot's poses come from, if it carries the scanner: by its make, one of the two is wired.
+  emulators::RtdeDevice rtde;
+  emulators::PoseSender pose_sender;
   /// The robot's signal "clear of the view" is wired to the PLC; a test may hold it down.
   bool robot_in_the_way = false;
   /// What the vision worker takes in this world's time; the detection itself is the real one.
@@ -67,6 +73,8 @@ class EmulatedCell {
   Wire plc_wire();
   Wire scanner_wire();
   Wire robot_wire();
+  Wire rtde_wire();
+  Wire pose_wire();
   void pump();
   bool pump_frames();
   bool pump_datagrams();
@@ -78,7 +86,7 @@ class EmulatedCell {
   std::uint16_t boot_count_ = 0;
   std::unique_ptr<daemon::Cell> cell_;
   plc::ConnectionId plc_connection_ = 0;
-  Wire plc_wire_, scanner_wire_, robot_wire_;
+  Wire plc_wire_, scanner_wire_, robot_wire_, rtde_wire_, pose_wire_;
   bool can_up_ = false;
   std::optional<TimePoint> udp_up_at_;           // the socket to an LPS 36 opens; nothing: it is open
   std::optional<daemon::DetectResult> looking_;  // comes out at looked_at_

@@ -9,7 +9,21 @@ using drivers::robot::Reply;
 using drivers::robot::Request;
 using drivers::robot::Status;
 
-Robot::Robot(const RobotOptions& options) : options_{options}, random_{options.seed} {}
+Robot::Robot(const RobotOptions& options) : options_{options}, random_{options.seed} {
+  if (!options_.paths.empty()) path_ = options_.paths.begin()->second;
+}
+
+Transform<frame::Base, frame::Flange> Robot::flange_at(TimePoint at) const {
+  if (!path_) return {};
+  const double run = path_began_ ? in_s(at - *path_began_) / in_s(path_->duration) : 0;
+  const double share = std::clamp(run, 0.0, path_share_);
+  const Eigen::Isometry3d &from = path_->T_base_begin.iso, &to = path_->T_base_end.iso;
+  Transform<frame::Base, frame::Flange> T_base_flange;
+  T_base_flange.iso.translation() = (1 - share) * from.translation() + share * to.translation();
+  T_base_flange.iso.linear() =
+      Eigen::Quaterniond{from.linear()}.slerp(share, Eigen::Quaterniond{to.linear()}).toRotationMatrix();
+  return T_base_flange;
+}
 
 void Robot::on_connected(TimePoint now) {
   connected_ = true;
@@ -39,12 +53,12 @@ std::optional<TimePoint> Robot::deadline() const {
   if (stopped_before_ != faults.emergency_stop) return now_;
   if (faults.emergency_stop || faults.silent) return std::nullopt;
   std::optional<TimePoint> next;
-  if (motion_ != Motion::None) next = motion_until_;
+  if (!may_talk() && motion_ != Motion::Stopped) next = motion_until_;
   if (!connected_) return next;
   if (faults.unplugged) return now_;
   if (!due_.empty()) next = earlier(next, due_.front().at);
   if (waiting_ != Waiting::None) return earlier(next, reply_until_);
-  return motion_ == Motion::None ? earlier(next, next_poll_) : next;
+  return may_talk() ? earlier(next, next_poll_) : next;
 }
 
 Bytes Robot::take_output() { return std::exchange(out_, {}); }
@@ -58,7 +72,8 @@ std::optional<Robot::Event> Robot::take_event() {
 }
 
 void Robot::restart_program(TimePoint now) {
-  if (motion_ != Motion::None) {
+  if (motion_ == Motion::Stopped) motion_ = Motion::PathOver;
+  if (motion_ != Motion::None && motion_ != Motion::PathOver) {
     motion_ = Motion::Retreat;
     motion_until_ = now + options_.retreat;
   }
@@ -99,7 +114,7 @@ void Robot::update(TimePoint now) {
 }
 
 void Robot::move_on(TimePoint now) {
-  while (motion_ != Motion::None && now >= motion_until_) {
+  while (!may_talk() && motion_ != Motion::Stopped && now >= motion_until_) {
     if (motion_ == Motion::Approach) {
       motion_ = Motion::Grasp;
       motion_until_ += options_.grasp;
@@ -107,6 +122,11 @@ void Robot::move_on(TimePoint now) {
       gripped_ = !faults.error_code && (!on_grasp || on_grasp(pick_));
       motion_ = Motion::Retreat;
       motion_until_ += options_.retreat;
+    } else if (motion_ == Motion::ToPath) {
+      motion_ = Motion::AtPath;
+      path_began_.reset();
+    } else if (motion_ == Motion::OnPath) {
+      motion_ = path_share_ < 1 && !tells_of_stop ? Motion::Stopped : Motion::PathOver;
     } else {
       motion_ = Motion::None;
     }
@@ -116,10 +136,18 @@ void Robot::move_on(TimePoint now) {
 void Robot::talk(TimePoint now) {
   if (waiting_ != Waiting::None) return;
   if (!greeted_) return ask({Request::Kind::Hello, 0}, Waiting::Hello, now);
-  if (motion_ != Motion::None || now < next_poll_) return;
+  if (!may_talk() || now < next_poll_) return;
+  if (motion_ == Motion::AtPath) return ask({Request::Kind::Begin, scan_}, Waiting::Begin, now);
+  if (motion_ == Motion::PathOver)
+    return ask({path_share_ < 1 ? Request::Kind::Broken : Request::Kind::End, scan_}, Waiting::PathReport, now);
   if (!pick_open_) return ask({Request::Kind::Fetch, 0}, Waiting::Fetch, now);
   const auto id = static_cast<std::uint16_t>(pick_.pick_id + (faults.wrong_id ? 1 : 0));
   ask({gripped_ ? Request::Kind::Done : Request::Kind::Failed, std::max<std::uint16_t>(id, 1)}, Waiting::Report, now);
+}
+
+/// The program stands at a place where it speaks with the cell.
+bool Robot::may_talk() const {
+  return motion_ == Motion::None || motion_ == Motion::AtPath || motion_ == Motion::PathOver;
 }
 
 void Robot::ask(const Request& request, Waiting waiting, TimePoint now) {
@@ -145,7 +173,29 @@ void Robot::on_reply(const Reply& reply, TimePoint now) {
       greeted_ = true;
       next_poll_ = now;
       break;
+    case Waiting::Begin:
+      if (reply.status == Status::UnknownScan) motion_ = Motion::None;
+      if (reply.status != Status::Go) break;
+      motion_ = Motion::OnPath;
+      path_began_ = now;
+      path_share_ = std::exchange(stops_at, std::nullopt).value_or(1);
+      motion_until_ = now + std::chrono::duration_cast<Duration>(path_share_ * path_->duration);
+      break;
+    case Waiting::PathReport:
+      motion_ = Motion::None;
+      events_.push_back(ScanAnswered{scan_, reply.status});
+      next_poll_ = now;
+      break;
     case Waiting::Fetch:
+      if (reply.status == Status::Scan && options_.paths.contains(reply.pick.part_id)) {
+        scan_ = reply.pick.pick_id;
+        path_ = options_.paths.at(reply.pick.part_id);
+        path_share_ = 1;
+        path_began_.reset();
+        motion_ = Motion::ToPath;
+        motion_until_ = now + options_.to_path;
+        break;
+      }
       if (reply.status != Status::Pick) {
         if (last_status_ != reply.status) events_.push_back(NoPickRead{reply.status});
         last_status_ = reply.status;

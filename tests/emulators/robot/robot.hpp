@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <map>
 #include <optional>
 #include <random>
 #include <string>
@@ -14,6 +15,12 @@
 #include "tests/emulators/faults.hpp"
 
 namespace binpick::emulators {
+/// A path that the robot carries the scanner along, at constant speed.
+struct ScanPath {
+  Transform<frame::Base, frame::Flange> T_base_begin, T_base_end;
+  Duration duration = std::chrono::seconds(3);
+};
+
 struct RobotOptions {
   drivers::robot::Dialect dialect = drivers::robot::Dialect::UniversalRobots;
   Duration poll_period = std::chrono::milliseconds(100);
@@ -21,6 +28,8 @@ struct RobotOptions {
   Duration approach = std::chrono::milliseconds(600);
   Duration grasp = std::chrono::milliseconds(200);
   Duration retreat = std::chrono::milliseconds(600);
+  std::map<std::uint16_t, ScanPath> paths = {};  ///< By the numbers that the program knows.
+  Duration to_path = std::chrono::milliseconds(800);
   std::uint64_t seed = 1;  ///< Of garbage.
 };
 
@@ -44,10 +53,14 @@ class Robot {
     bool done;
     drivers::robot::Status status;
   };
+  struct ScanAnswered {
+    std::uint16_t scan;
+    drivers::robot::Status status;
+  };  ///< To the word that its path has ended, or was broken off.
   struct Trouble {
     std::string text;
   };  ///< The program opens its socket anew.
-  using Event = std::variant<PickRead, NoPickRead, ReportAnswered, Trouble>;
+  using Event = std::variant<PickRead, NoPickRead, ReportAnswered, ScanAnswered, Trouble>;
 
   explicit Robot(const RobotOptions& options = {});
 
@@ -64,6 +77,12 @@ class Robot {
   bool wants_link() const { return !faults.unplugged && !faults.emergency_stop; }
   /// The signal "robot clear of the view", which a plant wires to its PLC.
   bool clear_of_view() const { return motion_ == Motion::None; }
+  /// Where the flange is; it moves on scan paths only (the arm's other motions take time and nothing else).
+  Transform<frame::Base, frame::Flange> flange_at(TimePoint at) const;
+  /// It stops at this share of the next path and stays there, as by a protective stop. Says so, or not: a program that
+  /// is stopped cannot.
+  std::optional<double> stops_at;
+  bool tells_of_stop = true;
   std::uint64_t picks_done() const { return done_; }
   std::uint64_t picks_failed() const { return failed_; }
 
@@ -78,8 +97,8 @@ class Robot {
   Faults faults;
 
  private:
-  enum class Motion { None, Approach, Grasp, Retreat };
-  enum class Waiting { None, Hello, Fetch, Report };
+  enum class Motion { None, Approach, Grasp, Retreat, ToPath, AtPath, OnPath, PathOver, Stopped };
+  enum class Waiting { None, Hello, Fetch, Report, Begin, PathReport };
   struct Due {
     TimePoint at;
     std::byte byte;
@@ -89,6 +108,7 @@ class Robot {
   void talk(TimePoint now);
   void ask(const drivers::robot::Request& request, Waiting waiting, TimePoint now);
   void on_reply(const drivers::robot::Reply& reply, TimePoint now);
+  bool may_talk() const;
   void fail_link(const std::string& text);
   void send_due(TimePoint now);
   void send(std::byte byte);
@@ -101,6 +121,10 @@ class Robot {
   // The arm.
   Motion motion_ = Motion::None;
   TimePoint motion_until_{};
+  std::uint16_t scan_ = 0;
+  std::optional<ScanPath> path_;  // the last one, that the flange stands on
+  std::optional<TimePoint> path_began_;
+  double path_share_ = 1;  // of it that is run
   bool stopped_before_ = false;
   TimePoint stopped_at_{};
   // The program.

@@ -81,6 +81,54 @@ TEST(Load, ALeuzeScannerHasKeysOfItsOwn) {
   }
 }
 
+/// The example cell with its scanner on the robot.
+void put_on_robot(CellFolder& folder, const std::string& dialect) {
+  const std::size_t from = folder.cell.find("[pivot]"), to = folder.cell.find("[scanner]");
+  folder.cell.erase(from, to - from);
+  folder.edit("[scanner]\n",
+              "[scanner]\ncarrier = \"robot\"\nT_flange_scanner = { xyz_mm = [0, 80, 120], rpy_deg = [0, 0, 0] }\n");
+  folder.edit("\ncarrier = \"pivot\"", "\n");
+  folder.edit("T_pivot_scanner = { xyz_mm = [60, 0, 0], rpy_deg = [180, -90, 0] }", "");
+  folder.edit("dialect = \"ur\"",
+              "dialect = \"" + dialect + "\"\n" +
+                  (dialect == "ur" ? "pose_address = \"192.168.0.20:30004\"" : "pose_listen = \"0.0.0.0:5003\""));
+  for (const char* key : {"sweep_start_deg = -16", "sweep_end_deg = 16", "sweep_speed_deg_s = 34"})
+    folder.edit(key, "");
+}
+
+TEST(Load, TheRobotMayCarryTheScanner) {
+  for (const char* dialect : {"ur", "fanuc"}) {
+    CellFolder folder;
+    put_on_robot(folder, dialect);
+    const auto loaded = folder.load();
+    ASSERT_TRUE(loaded.has_value()) << folder.findings();
+    EXPECT_EQ(loaded->carrier, Carrier::Robot);
+    EXPECT_EQ(loaded->T_flange_scanner.iso.translation(), Eigen::Vector3d(0, 80, 120));
+    EXPECT_EQ(std::holds_alternative<drivers::rtde::Options>(loaded->pose_options()), std::string{dialect} == "ur");
+    EXPECT_EQ(loaded->supplies[0].scan_path, 1);
+  }
+}
+
+TEST(Load, WhatARobotThatCarriesTheScannerNeedsIsAskedFor) {
+  const auto findings = [](const std::string& from, const std::string& to) {
+    CellFolder folder;
+    put_on_robot(folder, "ur");
+    folder.edit(from, to);
+    return folder.findings();
+  };
+  const auto expect = [&](const std::string& from, const std::string& to, const std::string& said) {
+    EXPECT_NE(findings(from, to).find(said), std::string::npos) << findings(from, to);
+  };
+  expect("pose_address = \"192.168.0.20:30004\"", "", "robot.pose_address is missing, but the robot carries");
+  expect("T_flange_scanner = { xyz_mm = [0, 80, 120], rpy_deg = [0, 0, 0] }", "",
+         "scanner.T_flange_scanner is missing in [scanner]");
+  expect("dialect = \"ur\"", "dialect = \"kawasaki\"", "robot.pose_listen is missing");
+  expect("T_base_supply", "path_timeout_ms = 15000\nT_base_supply", "supply.path_timeout_ms = 15000 is not less than");
+  expect("T_base_supply", "sweep_end_deg = 16\nT_base_supply",
+         "supply.sweep_end_deg is for scanner.carrier = pivot only; remove it");
+  expect("[scanner]", "[pivot]\ncan = \"can0\"\n[scanner]", "pivot.can is for scanner.carrier = pivot only; remove it");
+}
+
 TEST(Load, KeysOfTheOtherScannerAreNamed) {
   CellFolder folder;
   make_leuze(folder, "lps36");
