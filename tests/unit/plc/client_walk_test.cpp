@@ -35,7 +35,7 @@ class ClientWalk {
         plc.raise_reset();
         break;
       case 8:
-        plc.drop_request();
+        if (plc.acknowledged()) plc.drop_request();  // a request stands until then, that much a program owes
         break;
       case 9:
         if (pick(8) == 0) pair_.session->fault(Alarm::ScannerNoReply, pair_.now), forget_cycle();
