@@ -1,5 +1,9 @@
 #include "daemon/cell_data.hpp"
 
+#include <filesystem>
+
+#include "base/log.hpp"
+
 namespace binpick::daemon {
 namespace {
 Expected<vision::KnowledgeBase, vision::KnowledgeBaseError> verified(const vision::KnowledgeBase& opened) {
@@ -24,8 +28,13 @@ Expected<std::shared_ptr<const CellData>, std::vector<std::string>> load_cell(co
       continue;
     }
     cell->knowledge_bases.push_back(*knowledge);
+    std::error_code unknown;
+    if (const auto bytes = std::filesystem::file_size(recipe.knowledge_base, unknown); !unknown)
+      cell->knowledge_mib += static_cast<double>(bytes) / (1 << 20);
   }
   if (!findings.empty()) return unexpected(std::move(findings));
+  BINPICK_LOG(Notice, "vision", "%zu knowledge base(s) mapped, %.0f MiB; pages in use are read once and shared",
+              cell->knowledge_bases.size(), cell->knowledge_mib);
   return std::shared_ptr<const CellData>{std::move(cell)};
 }
 }  // namespace binpick::daemon

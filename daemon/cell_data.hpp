@@ -14,6 +14,7 @@ namespace binpick::daemon {
 struct CellData {
   config::Config config;
   std::vector<vision::KnowledgeBase> knowledge_bases;  ///< One per recipe, same order.
+  double knowledge_mib = 0;                            ///< Of their files, all mapped.
 };
 
 /// Reads the cell file, its part files and knowledge bases. The error is every finding as a text to print.

@@ -69,11 +69,22 @@ std::string to_toml(const CellFile& file) {
     out << "sweep_start_deg = " << -layout.sweep_deg << "\nsweep_end_deg = " << layout.sweep_deg
         << "\nsweep_speed_deg_s = "
         << (file.scanner == "lms400" ? file.sweep_speed_deg_s : file.sweep_speed_deg_s * 0.4) << "\n";
+  if (file.second_supply)
+    out << "\n[[supply]]\nid = 2\nname = \"beside it\"\nsize_mm = [600, 600, 300]\nT_base_supply = { xyz_mm = ["
+        << 1200 + kBeside_mm.x() << ", " << kBeside_mm.y() << ", " << kBeside_mm.z()
+        << "], rpy_deg = [0, 0, 0] }\nsweep_start_deg = 20\nsweep_end_deg = 38\nsweep_speed_deg_s = "
+        << file.sweep_speed_deg_s << "\n";
   int id = 0;
-  for (const auto& part : file.parts)
-    out << "\n[[part]]\nid = " << ++id << "\nfile = \"" << BINPICK_TEST_PARTS << "/" << part
-        << ".toml\"\nknowledge_base = \"" << BINPICK_TEST_PARTS << "/" << part
-        << ".kb\"\nscore_min = " << file.score_min << "\n";
+  for (const auto& part : file.parts) {
+    ++id;
+    out << "\n[[part]]\nid = " << id << "\nfile = \"" << BINPICK_TEST_PARTS << "/" << part
+        << ".toml\"\nknowledge_base = \"";
+    if (file.own_copies)
+      out << "part" << id << ".kb";
+    else
+      out << BINPICK_TEST_PARTS << "/" << part << ".kb";
+    out << "\"\nscore_min = " << file.score_min << "\n";
+  }
   return out.str();
 }
 
@@ -91,6 +102,9 @@ TestFolder::~TestFolder() {
 std::string TestFolder::write(const CellFile& file, const std::string& name) {
   const std::string file_path = path_ + "/" + name;
   std::ofstream(file_path) << to_toml(file);
+  for (std::size_t i = 0; file.own_copies && i < file.parts.size(); ++i)
+    fs::copy_file(std::string{BINPICK_TEST_PARTS} + "/" + file.parts[i] + ".kb",
+                  path_ + "/part" + std::to_string(i + 1) + ".kb", fs::copy_options::overwrite_existing);
   return file_path;
 }
 

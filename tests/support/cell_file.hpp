@@ -16,6 +16,8 @@ struct CellFile {
   std::string plc_role = "server";                  ///< plc.role: what the daemon is.
   std::string robot = "ur";                         ///< robot.dialect and plc.pose_convention.
   std::vector<std::string> parts = {"track_link"};  ///< Example parts that the build has trained; ids 1, 2, ….
+  bool own_copies = false;                          ///< Each recipe gets a knowledge base file of its own.
+  bool second_supply = false;                       ///< Id 2: a place on the floor beside the box, see kBeside_mm.
   double tilt_max_deg = 45;
   double score_min = 0.5;
   double sweep_speed_deg_s = 25;
@@ -34,6 +36,9 @@ struct CellFile {
 /// A third of the points: for tests that look at the sequence and not at millimetres, and have to keep pace under a
 /// sanitizer.
 CellFile coarse_cell();
+
+/// Middle of the second supply in the first one's frame; 600 × 600 mm, an LMS 400 on the pivot sees both.
+inline const Eigen::Vector3d kBeside_mm{0, 1000, 0};
 
 std::string to_toml(const CellFile& file);
 

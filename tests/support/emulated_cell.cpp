@@ -247,7 +247,11 @@ void EmulatedCell::pump() {
     moved |= rtde_wire_.pump(now_);
     moved |= pose_wire_.pump(now_);
     if (cell_) {
+      const bool idle = cell_->state() == daemon::CellState::Idle;
+      const TimePoint before = std::chrono::steady_clock::now();
       cell_->run(now_);
+      if (idle && cell_->state() == daemon::CellState::Sweeping)
+        took_up_.push_back(std::chrono::steady_clock::now() - before);
       if (auto request = cell_->take_detect_request()) {
         ++sweeps_;
         last_image_ = request->image;

@@ -65,6 +65,8 @@ class EmulatedCell {
   void start_daemon();  ///< As systemd does after it: the next boot count.
 
   const vision::DepthImage& last_image() const { return last_image_; }  ///< Of the last sweep.
+  /// Real time that the cell took from seeing a request to having its sweep begun, of each.
+  const std::vector<Duration>& took_up() const { return took_up_; }
   std::uint64_t sweeps() const { return sweeps_; }                      ///< Detect requests that the cell made.
   const std::vector<daemon::DetectResult>& results() const { return results_; }  ///< Of all detections, oldest first.
 
@@ -93,6 +95,7 @@ class EmulatedCell {
   TimePoint looked_at_{};
   vision::DepthImage last_image_;
   std::uint64_t sweeps_ = 0;
+  std::vector<Duration> took_up_;
   std::vector<daemon::DetectResult> results_;
 };
 }  // namespace binpick::support
