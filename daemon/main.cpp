@@ -100,9 +100,11 @@ int run(const std::string& path) {
       }
     }
   });
-  BINPICK_LOG(Notice, "daemon", "%s is up: PLC at %s, pivot %s, scanner %s, robot at %s",
-              (*loaded)->config.name.c_str(), (*loaded)->config.plc_line().c_str(), (*loaded)->config.pivot_can.c_str(),
-              (*loaded)->config.scanner_address.c_str(), (*loaded)->config.robot_listen.c_str());
+  const auto& config = (*loaded)->config;
+  const std::string carrier =
+      config.carrier == config::Carrier::Robot ? "on the robot" : "on the pivot at " + config.pivot_can;
+  BINPICK_LOG(Notice, "daemon", "%s is up: PLC at %s, scanner %s %s, robot at %s", config.name.c_str(),
+              config.plc_line().c_str(), config.scanner_address.c_str(), carrier.c_str(), config.robot_listen.c_str());
   sd_notify(0, "READY=1\nSTATUS=running");
 
   TimePoint now = clock.now();

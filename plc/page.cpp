@@ -209,7 +209,8 @@ a second), and read words 8 … 81 in every poll. All signals are levels: hold e
    word order, do not fit. Read `ack_sequence` and `boot_count`.
 2. Write the block with `control` = 0 (or 8: `robot_clear`) once. A request that already stands when the cell has just started
    is not carried out (result code 30); it has to be seen 0 first.
-3. Set `robot_clear` (bit 3) whenever the robot is out of the scanner's view, and clear it before it goes in.
+3. Set `robot_clear` (bit 3) whenever the robot is out of the scanner's view, and clear it before it goes in. (Where the robot
+   carries the scanner, the bit means nothing: the cell asks the robot itself.)
 4. **Wait for the robot, then for `ready`** (status bit 0; while it is 0, `not_ready` says why). `ready` speaks for the cell alone:
    it is 1 again as soon as a result is acknowledged, while the robot is still on its way. After a result with code 1 the robot
    has to have gone in (`robot_clear` 0) and come out again (`robot_clear` 1) before the next request is raised. A request that

@@ -125,7 +125,9 @@ inline constexpr std::array kControlBits{
         "Stop and forget the running cycle, clear the result. Hold until abort_ack; while it is 1, requests are "
         "refused."},
     Bit{2, "reset", "Go on after a fault; clears the alarm list. Hold until reset_ack."},
-    Bit{3, "robot_clear", "The robot is out of the scanner's view. No sweep is made while this is 0."},
+    Bit{3, "robot_clear",
+        "The robot is out of the scanner's view. No sweep is made while this is 0, unless the robot carries the "
+        "scanner."},
 };
 
 /// Bits of `status`.
