@@ -149,6 +149,9 @@ std::string to_string(const DecodeError& error) {
     case DecodeError::Kind::BadValue:
       text = "a number that is not finite";
       break;
+    case DecodeError::Kind::BadFragment:
+      text = "a fragment out of order";
+      break;
   }
   char line[96];
   std::snprintf(line, sizeof line, "%s (CAN id %03X, %u bytes, code %02X)", text, error.id, unsigned{error.length},
@@ -223,7 +226,7 @@ CanFrame encode(std::uint8_t module_id, const Reply& reply) {
                    put_u8(frame, static_cast<std::uint8_t>(accepted.motion));
                    if (accepted.report) put_report(*accepted.report);
                  },
-                 [&](const StateChanged&) { frame.id = kStateBase + module_id; },
+                 [&](const StateNews&) { frame.id = kStateBase + module_id; },
              },
              reply);
   return frame;
@@ -232,7 +235,7 @@ CanFrame encode(std::uint8_t module_id, const Reply& reply) {
 Expected<Reply, DecodeError> decode_reply(std::uint8_t module_id, const CanFrame& frame) {
   using Kind = DecodeError::Kind;
   if (!is_standard_data(frame)) return unexpected(error(Kind::NotOurs, frame));
-  if (frame.id == kStateBase + module_id) return Reply{StateChanged{}};
+  if (frame.id == kStateBase + module_id) return Reply{StateNews{}};
   if (frame.id != kReplyBase + module_id) return unexpected(error(Kind::NotOurs, frame));
   if (frame.length < 1) return unexpected(error(Kind::BadLength, frame));
   const std::uint8_t byte = frame.payload[0];

@@ -130,10 +130,10 @@ struct MoveAccepted {
   friend bool operator==(const MoveAccepted&, const MoveAccepted&) = default;
 };
 /// The module spoke without being asked (0x060 + id). Public drivers do not read the content; ask for the state word.
-struct StateChanged {
-  friend bool operator==(const StateChanged&, const StateChanged&) = default;
+struct StateNews {
+  friend bool operator==(const StateNews&, const StateNews&) = default;
 };
-using Reply = std::variant<Value, SetDone, PlainDone, MoveAccepted, StateChanged>;
+using Reply = std::variant<Value, SetDone, PlainDone, MoveAccepted, StateNews>;
 
 struct DecodeError {
   enum class Kind {
@@ -142,11 +142,13 @@ struct DecodeError {
     UnknownCommand,
     UnknownParameter,
     UnknownMotion,
-    BadValue
+    BadValue,
+    BadFragment  ///< Motion Protocol: out of order, or one is missing.
   } kind = Kind::NotOurs;
   std::uint32_t id = 0;
   std::uint8_t length = 0;
   std::uint8_t what = 0;  ///< Command, parameter or motion byte.
+  friend bool operator==(const DecodeError&, const DecodeError&) = default;
 };
 std::string to_string(const DecodeError& error);
 

@@ -22,6 +22,8 @@ Ramp Ramp::plan(double from, double speed_from, double target, double speed_max,
   ramp.from_ = from;
   ramp.speed_from_ = speed_from;
   ramp.target_ = target;
+  ramp.speed_max_ = speed_max;
+  ramp.acceleration_ = acceleration;
   // Where it would stand if it braked now decides the direction of the way.
   const double stop_at = from + speed_from * std::abs(speed_from) / (2 * acceleration);
   const double sign = target >= stop_at ? 1.0 : -1.0;

@@ -16,6 +16,8 @@ class Ramp {
   double speed(double t_s) const;
   double duration_s() const { return duration_; }
   double target() const { return target_; }
+  double speed_max() const { return speed_max_; }
+  double acceleration() const { return acceleration_; }
 
  private:
   struct Piece {
@@ -25,6 +27,6 @@ class Ramp {
 
   std::array<Piece, 4> pieces_{};
   std::size_t count_ = 0;
-  double from_ = 0, speed_from_ = 0, target_ = 0, duration_ = 0;
+  double from_ = 0, speed_from_ = 0, target_ = 0, duration_ = 0, speed_max_ = 0, acceleration_ = 1;
 };
 }  // namespace binpick::drivers::pivot

@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "base/log.hpp"
+#include "base/overloaded.hpp"
+#include "drivers/pivot/motion_errors.hpp"
 #include "drivers/pivot/session_impl.hpp"
 #include "drivers/pivot/state_word.hpp"
 
@@ -13,13 +15,15 @@ constexpr Duration kWatchdogPeriod = 50ms;  ///< The module's own period is not 
 constexpr Duration kSetpointCycleMax = 20ms;
 constexpr Duration kMoveLateMax = 1s;        ///< After the end of its ramp, a move must be done.
 constexpr std::size_t kEventsMax = 100'000;  ///< Nobody takes them: drop the oldest rather than grow.
+constexpr Duration kUnfinishedMax = 5ms;     ///< From "heard" to what was asked for; then it is asked again.
 
-bool has_position(const Value& value) {
-  return value.parameter == Parameter::Position || value.parameter == Parameter::PositionAndState;
+bool is_answer(const ModuleProtocol& protocol, const Ask& ask, const Answer& answer) {
+  const std::uint16_t key = protocol.key(ask);
+  return answer.key == key || (answer.refused && answer.key >> 8 == key >> 8);
 }
 }  // namespace
 
-Session::Impl::Impl(const Options& o) : options{o} {
+Session::Impl::Impl(const Options& o) : options{o}, protocol{make_protocol(o)} {
   const Duration horizon = std::max<Duration>(options.setpoint_horizon, 20ms);
   cycle = std::clamp<Duration>(horizon / 4, 5ms, kSetpointCycleMax);
 }
@@ -41,24 +45,33 @@ std::string Session::Impl::bus_off_text() {
          "has restart-ms set";
 }
 
-void Session::Impl::send(const Request& request, int attempts) {
-  out.push_back(encode(options.module_id, request));
-  const bool read = std::holds_alternative<Get>(request);
-  if (std::holds_alternative<Move>(request) && (config_word & config_bit::kSynchronousMotion) != 0)
-    out.push_back(encode(options.module_id, Broadcast{Command::StartMotion}));
-  if (!read && (config_word & config_bit::kSuppressAcknowledge) != 0) return;
-  outstanding = Outstanding{request, now, now + options.reply_timeout, attempts};
+void Session::Impl::owe(Ask::What what, bool answer_matters) {
+  Ask ask;
+  ask.what = what;
+  owed = Owed{ask, 1, answer_matters};
+}
+
+void Session::Impl::send(const Owed& o) {
+  for (const CanFrame& frame : protocol->frames(o.ask)) out.push_back(frame);
+  write_at = now + protocol->write_gap();
+  if (o.answer_matters && protocol->is_answered(o.ask))
+    outstanding = Outstanding{o.ask, now, now + options.reply_timeout, o.attempts};
 }
 
 void Session::Impl::pump() {
-  for (int i = 0; i < 4 && !outstanding; ++i) {
-    const auto request = next_request();
-    if (!request) return;
-    send(*request);
+  for (int i = 0; i < 4 && now >= write_at; ++i) {
+    if (owed) {
+      send(*std::exchange(owed, std::nullopt));
+      continue;
+    }
+    if (outstanding) return;
+    const auto ask = next_ask();
+    if (!ask) return;
+    send(Owed{*ask});
   }
 }
 
-std::optional<Request> Session::Impl::next_request() {
+std::optional<Ask> Session::Impl::next_ask() {
   switch (phase) {
     case Phase::Offline:
       return std::nullopt;
@@ -66,95 +79,141 @@ std::optional<Request> Session::Impl::next_request() {
     case Phase::Recover:
     case Phase::Reference:
       if (now < step_at) return std::nullopt;
-      return next_request_bringing_up();
+      return next_ask_bringing_up();
     case Phase::Stand:
     case Phase::Move:
-      return next_request_at_work();
+      return next_ask_at_work();
   }
   return std::nullopt;
 }
 
-void Session::Impl::on_reply(const Reply& reply, TimePoint received_at) {
+void Session::Impl::on_answer(const Answer& answer, TimePoint received_at) {
+  if (answer.unfinished) {
+    outstanding->give_up_at = std::min(outstanding->give_up_at, now + kUnfinishedMax);
+    return;
+  }
   const Outstanding was = *outstanding;
   outstanding.reset();
   const Duration round_trip = received_at - was.sent_at;
   bus_off = false;
   error_passive = false;
-  if (std::holds_alternative<MoveAccepted>(reply)) setpoints_missed = 0;
-  const auto* value = std::get_if<Value>(&reply);
-  if (value == nullptr) return on_command_done(was.request);
-  if (phase == Phase::Identify && round_trip > round_trip_max() && ++late_reads >= kLateReadsMax)
-    return late_replies(round_trip);
-  const bool sure = is_sure(was.attempts, *value);
-  if (const auto* report = std::get_if<PositionReport>(&value->value)) {
-    shorts = report->short_state;
-    on_position(report->position_rad, was.sent_at, round_trip, sure);
-    if ((shorts & short_state::kError) != 0) state_next = phase == Phase::Stand || phase == Phase::Move;
-  } else if (value->parameter == Parameter::Position) {
-    on_position(std::get<float>(value->value), was.sent_at, round_trip, sure);
-  } else if (value->parameter == Parameter::StateWord && phase != Phase::Identify) {
-    word = std::get<std::uint32_t>(value->value);
-    shorts = to_short_state(word);
-    on_state_word();
-  } else if (phase == Phase::Identify) {
-    on_identity(*value);
+  if (answer.refused) return on_refused(was.ask, answer);
+  if (!answer.reads) return on_command_done(was.ask);
+  if (phase == Phase::Identify) {
+    if (round_trip > round_trip_max() && ++late_reads >= kLateReadsMax) return late_replies(round_trip);
+    return on_identity(was.ask, answer);
   }
+  const bool sure = is_sure(was.attempts, answer);
+  if (answer.shorts) shorts = *answer.shorts;
+  if (answer.state) on_state(*answer.state);
+  if (answer.position_rad && was.ask.what == Ask::What::Position)
+    on_position(*answer.position_rad, was.sent_at, round_trip, sure);
+  if (answer.shorts && (shorts & short_state::kError) != 0) state_next = phase == Phase::Stand || phase == Phase::Move;
 }
 
-bool Session::Impl::is_sure(int attempts, const Value& value) {
-  if (!has_position(value)) return true;
+bool Session::Impl::looks_like_position(const Ask& ask) const {
+  Ask position;
+  position.what = Ask::What::Position;
+  return protocol->key(ask) == protocol->key(position);
+}
+
+bool Session::Impl::is_sure(int attempts, const Answer& answer) {
+  if (!answer.position_rad) return true;
   if (attempts > 1) return false;
   if (doubles == 0 || now >= doubles_until) return true;
   --doubles;
   return false;
 }
 
-void Session::Impl::on_unexpected(const Reply& reply) {
-  const auto* value = std::get_if<Value>(&reply);
-  if (value == nullptr) return;  // echoes of commands that waited for none
-  if (has_position(*value) && doubles > 0) --doubles;
-  if (phase != Phase::Identify) return;
+void Session::Impl::on_unexpected(const Answer& answer) {
+  if (!answer.reads) return;  // echoes of commands that waited for none
+  if (answer.position_rad && doubles > 0) --doubles;
+  if (phase != Phase::Identify || answer.unasked) return;
   if (repeated) return late_replies(options.reply_timeout);
   identify(kQuiet);  // answers to what was asked before: let them pass
 }
 
-void Session::Impl::on_no_reply() {
+void Session::Impl::on_no_answer() {
   const Outstanding was = *outstanding;
   outstanding.reset();
   repeated = phase == Phase::Identify;
-  if (const auto* get = std::get_if<Get>(&was.request);
-      get != nullptr && (get->parameter == Parameter::Position || get->parameter == Parameter::PositionAndState)) {
+  if (looks_like_position(was.ask)) {
     ++doubles;
     doubles_until = now + kQuiet;
   }
-  if (std::holds_alternative<pivot::Move>(was.request)) {
+  if (was.ask.what == Ask::What::Go) {
     if (++setpoints_missed >= kAttemptsMax) return lost();
     setpoint_at = now;  // a fresh one, not the same again: time has passed
     return;
   }
   if (was.attempts >= kAttemptsMax) return lost();
-  send(was.request, was.attempts + 1);
+  owed = Owed{was.ask, was.attempts + 1};
+}
+
+void Session::Impl::on_refused(const Ask& ask, const Answer& answer) {
+  const std::string reason = motion::info_in_words(*answer.refused);
+  switch (ask.what) {
+    case Ask::What::Identity:
+      return on_identity(ask, answer);
+    case Ask::What::State:
+    case Ask::What::Position:
+      ++garbled;
+      garbled_text = "its state is refused, " + reason;
+      if (phase != Phase::Stand && phase != Phase::Move) lost();
+      return;
+    case Ask::What::Halt:
+    case Ask::What::Reset:
+      return;  // its state says how it goes on
+    case Ask::What::Home:
+      reference_refused = "the module refuses its reference run: " + reason;
+      step_at = now;
+      return;
+    case Ask::What::Prepare:
+    case Ask::What::Go:
+      state_next = true;  // says more than the refusal, most often
+      setpoint_at = now + cycle;
+      if (++setpoints_missed < kAttemptsMax) return;
+      fail(Failed::Why::MoveRefused, "the module refuses to move: " + reason);
+      recover(true);
+  }
+}
+
+void Session::Impl::on_other_master() {
+  const bool in_use = phase == Phase::Stand || phase == Phase::Move || phase == Phase::Reference;
+  if (!in_use || options.identify_only) return;
+  fail(Failed::Why::ModuleError, formatted("another master commands pivot module %u on this bus: end the other program",
+                                           unsigned{options.module_id}));
+  recover(true);
+}
+
+void Session::Impl::on_blocked(double position) {
+  const std::string text = formatted("the axis is blocked at %.2f deg: free it", degrees(position));
+  if (phase == Phase::Reference && !home_pending) return reference_failed("reference run failed: " + text);
+  if (phase != Phase::Move || !stream) return;
+  fail(Failed::Why::MoveRefused, text);
+  recover(true);
 }
 
 void Session::Impl::on_frame(const CanFrame& frame, TimePoint received_at) {
   if (frame.error) return on_error_frame(frame);
-  const auto reply = decode_reply(options.module_id, frame);
-  if (!reply) {
-    if (reply.error().kind != DecodeError::Kind::NotOurs) {
-      ++garbled;
-      garbled_text = to_string(reply.error());
-    } else if (!frame.extended && !frame.rtr && frame.id > kReplyBase && frame.id <= kReplyBase + kModuleIdMax) {
-      foreign_module = frame.id - kReplyBase;
-    }
-    return;
-  }
-  if (std::holds_alternative<StateChanged>(*reply)) {
-    state_next = phase == Phase::Stand || phase == Phase::Move;
-  } else if (outstanding && answers(outstanding->request, *reply)) {
-    on_reply(*reply, received_at);
-  } else {
-    on_unexpected(*reply);
-  }
+  std::visit(Overloaded{
+                 [](const Nothing&) {},
+                 [&](const Answer& answer) {
+                   if (outstanding && is_answer(*protocol, outstanding->ask, answer))
+                     on_answer(answer, received_at);
+                   else
+                     on_unexpected(answer);
+                 },
+                 [&](const StateChanged&) { state_next = phase == Phase::Stand || phase == Phase::Move; },
+                 [&](const Garbled& news) {
+                   ++garbled;
+                   garbled_text = news.text;
+                 },
+                 [&](const ForeignModule& other) { foreign_module = other.id; },
+                 [&](const OtherMaster&) { on_other_master(); },
+                 [&](const Blocked& blocked) { on_blocked(blocked.position_rad); },
+             },
+             protocol->hear(frame));
 }
 
 void Session::Impl::on_error_frame(const CanFrame& frame) {
@@ -175,11 +234,11 @@ void Session::Impl::on_error_frame(const CanFrame& frame) {
 }
 
 void Session::Impl::on_time() {
-  if (outstanding && now >= outstanding->give_up_at) on_no_reply();
+  if (outstanding && now >= outstanding->give_up_at) on_no_answer();
   const bool in_use = phase != Phase::Offline && phase != Phase::Identify;
-  if (in_use && (config_word & config_bit::kWatchdog) != 0 && now >= watchdog_at) {
+  if (const auto watchdog = protocol->watchdog(); in_use && watchdog && now >= watchdog_at) {
     watchdog_at = now + kWatchdogPeriod;
-    out.push_back(encode(options.module_id, Broadcast{Command::Watchdog}));
+    out.push_back(*watchdog);
   }
   if (phase == Phase::Reference && now >= reference_until)
     reference_failed(
@@ -201,23 +260,27 @@ void Session::Impl::on_time() {
 
 std::optional<TimePoint> Session::Impl::deadline() const {
   if (phase == Phase::Offline) return std::nullopt;
+  const bool at_work = phase == Phase::Stand || phase == Phase::Move;
   std::optional<TimePoint> at;
-  if (phase != Phase::Identify && (config_word & config_bit::kWatchdog) != 0) at = watchdog_at;
+  if (phase != Phase::Identify && protocol->watchdog()) at = watchdog_at;
   if (phase == Phase::Reference) at = earlier(at, reference_until);
-  if (phase == Phase::Stand || phase == Phase::Move) at = earlier(at, silent_until());
+  if (at_work) at = earlier(at, silent_until());
   if (stream) at = earlier(at, stream->end() + kMoveLateMax);
+  if (owed) at = earlier(at, write_at);
   if (outstanding) return earlier(at, outstanding->give_up_at);
-  if (phase == Phase::Stand || phase == Phase::Move) {
-    at = earlier(earlier(at, sample_at), state_at);
-    if (halt != Halt::None) at = earlier(at, step_at);
-    if (stream) at = earlier(at, setpoint_at);
-    if (state_next) at = now;
-    return at;
+  TimePoint next = step_at;
+  if (at_work) {
+    next = std::min(sample_at, state_at);
+    if (halt != Halt::None) next = std::min(next, step_at);
+    if (stream) next = std::min(next, setpoint_at);
+    if (state_next) next = std::min(next, now);
   }
-  return earlier(at, step_at);
+  return earlier(at, std::max(next, write_at));
 }
 
 Session::Session(const Options& options) : impl_{std::make_shared<Impl>(options)} {}
+
+std::vector<link::CanFilter> Session::filters() const { return impl_->protocol->filters(); }
 
 void Session::on_link_up(TimePoint now) {
   Impl& s = *impl_;
@@ -232,6 +295,7 @@ void Session::on_link_down(const std::string& why, TimePoint now) {
   s.now = std::max(s.now, now);
   s.out.clear();
   s.outstanding.reset();
+  s.owed.reset();
   s.drop_move();
   s.phase = Impl::Phase::Offline;
   const bool bus_off = s.bus_off || why.starts_with("bus-off");
@@ -288,6 +352,13 @@ std::optional<ModuleInfo> Session::module() const {
 
 std::uint32_t Session::state_word() const { return impl_->word; }
 
+std::string Session::state_in_words() const {
+  std::string text = pivot::state_in_words(impl_->word);
+  if (impl_->word != 0 && (impl_->word & state::kHomeOk) == 0) text = "not referenced, " + text;
+  if (impl_->code != 0) text += "; " + motion::error_in_words(impl_->code);
+  return text;
+}
+
 void Session::move_to(Angle target, double speed_rad_s, TimePoint now) {
   Impl& s = *impl_;
   s.now = std::max(s.now, now);
@@ -305,5 +376,6 @@ void Session::stop(TimePoint now) {
   Impl& s = *impl_;
   s.now = std::max(s.now, now);
   s.stop();
+  s.pump();
 }
 }  // namespace binpick::drivers::pivot

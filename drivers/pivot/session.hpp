@@ -12,12 +12,19 @@
 #include "base/units.hpp"
 #include "drivers/link/can.hpp"
 
-/// Schunk PR 70 rotary module, PowerCube protocol, as a session without I/O.
+/// Schunk PR 70 rotary module as a session without I/O, in either protocol that its generations speak.
 namespace binpick::drivers::pivot {
 using link::CanFrame;
 
+enum class Protocol {
+  PowerCube,  ///< The older electronics.
+  Motion,     ///< Schunk Motion Protocol, the newer ones.
+};
+const char* to_string(Protocol protocol);
+
 struct Options {
-  std::uint8_t module_id = 12;                   ///< 1 … 31.
+  Protocol protocol = Protocol::PowerCube;
+  std::uint8_t module_id = 12;                   ///< 1 … 31; Motion Protocol: 1 … 255.
   std::chrono::milliseconds reply_timeout{100};  ///< Silence after a request before it is repeated or given up.
   std::chrono::milliseconds sample_period{10};   ///< Position, state and time stamp are asked this often.
   std::chrono::milliseconds setpoint_horizon{
@@ -30,6 +37,7 @@ struct Options {
 
 /// What the module says of itself at start; limits are read, never assumed.
 struct ModuleInfo {
+  std::string type;  ///< As the module names itself; PowerCube modules do not.
   std::uint16_t firmware = 0;
   std::uint32_t serial = 0;
   Angle position_min, position_max;
@@ -50,8 +58,8 @@ struct MoveDone {
 /// The module, its supply or the bus failed. The session goes on by itself until it can say Ready again.
 struct Failed {
   enum class Why { NoReply, BusDown, BusOff, ModuleError, PowerFault, ReferenceFailed, MoveRefused } why = Why::NoReply;
-  std::uint32_t state_word = 0;  ///< Parameter 27, 0 when unknown.
-  std::string text;              ///< The state's bits and what to do, in words.
+  std::uint32_t state_word = 0;  ///< The bits of state_word.hpp, 0 when unknown.
+  std::string text;              ///< The state and what to do, in words.
 };
 using Event = std::variant<Ready, Sample, MoveDone, Failed>;
 
@@ -64,6 +72,8 @@ class Session {
 
   explicit Session(const Options& options);
 
+  /// The frames that it needs of the bus: the module's own, and those of anybody else who commands it.
+  std::vector<link::CanFilter> filters() const;
   void on_link_up(TimePoint now);
   void on_link_down(const std::string& why, TimePoint now);
   void on_frame(const CanFrame& frame, TimePoint received_at);
@@ -74,8 +84,10 @@ class Session {
   State state() const;
   /// What the module said of itself, once it has; kept when it goes silent.
   std::optional<ModuleInfo> module() const;
-  /// The last state word (parameter 27), 0 before the first; state_in_words() says what it means.
+  /// The last state (the bits of state_word.hpp), 0 before the first.
   std::uint32_t state_word() const;
+  /// The same in words, with the module's own error where it has one.
+  std::string state_in_words() const;
 
   /// Only in Standing or Moving (else ignored and logged). Clamped to the module's limits.
   void move_to(Angle target, double speed_rad_s, TimePoint now);

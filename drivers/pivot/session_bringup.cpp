@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "base/log.hpp"
 #include "drivers/pivot/session_impl.hpp"
@@ -9,26 +10,30 @@ namespace binpick::drivers::pivot {
 namespace {
 constexpr Duration kResetSettle = 100ms;  ///< Between RESET and the next look at the state.
 constexpr Duration kStatePollPassive = 500ms;
-constexpr Duration kBrakingMax = 500ms;  ///< Until an axis that still moves is halted once more.
-
-constexpr std::array kIdentity{Parameter::Firmware,    Parameter::SerialNumber,    Parameter::Config,
-                               Parameter::Setup,       Parameter::PositionMin,     Parameter::PositionMax,
-                               Parameter::VelocityMax, Parameter::AccelerationMax, Parameter::StateWord};
+constexpr double kLimitMin = 1e-3, kLimitMax = 1e4;  ///< rad, rad/s, rad/s²: no pivot has limits beyond.
+constexpr Duration kBrakingMax = 500ms;              ///< Until an axis that still moves is halted once more.
 }  // namespace
 
-std::optional<Request> Session::Impl::next_request_bringing_up() {
+std::optional<Ask> Session::Impl::next_ask_bringing_up() {
+  Ask ask;
   switch (phase) {
     case Phase::Identify:
-      return Get{kIdentity[identity_index]};
+      ask.step = identity_index;
+      if (identity_index < protocol->identity_steps()) ask.what = Ask::What::Identity;
+      return ask;
     case Phase::Recover:
-      if (std::exchange(halt_first, false)) return Plain{Command::Halt};
+      if (std::exchange(halt_first, false)) {
+        ask.what = Ask::What::Halt;
+        return ask;
+      }
       step_at = now + kResetSettle;
-      return Get{Parameter::StateWord};
+      return ask;
     case Phase::Reference:
       step_at = now + kStatePoll;
-      if (!std::exchange(home_pending, false)) return Get{Parameter::StateWord};
+      if (!std::exchange(home_pending, false)) return ask;
       BINPICK_LOG(Info, "pivot", "reference run");
-      return Plain{Command::Home};
+      ask.what = Ask::What::Home;
+      return ask;
     default:
       return std::nullopt;
   }
@@ -36,7 +41,7 @@ std::optional<Request> Session::Impl::next_request_bringing_up() {
 
 void Session::Impl::fail_by_state(Failed::Why otherwise) {
   const bool power = (word & state::kMotorSupply) != 0;
-  fail(power ? Failed::Why::PowerFault : otherwise, "pivot: " + faults_in_words(word));
+  fail(power ? Failed::Why::PowerFault : otherwise, "pivot: " + faults_in_words(ModuleState{word, code}));
 }
 
 Failed::Why Session::Impl::why_so_far() const {
@@ -57,7 +62,8 @@ void Session::Impl::be_ready() {
 }
 
 void Session::Impl::identify(Duration pause) {
-  if (phase == Phase::Move || phase == Phase::Reference) out.push_back(encode(options.module_id, Plain{Command::Halt}));
+  owed.reset();
+  if (phase == Phase::Move || phase == Phase::Reference) owe(Ask::What::Halt, false);
   phase = Phase::Identify;
   identity_index = 0;
   repeated = false;
@@ -83,6 +89,7 @@ void Session::Impl::reference() {
   drop_move();
   halt = Halt::None;
   home_pending = true;
+  reference_refused.clear();
   step_at = std::max(now, reference_not_before);
   reference_until = step_at + options.reference_timeout;
 }
@@ -124,8 +131,8 @@ void Session::Impl::lost() {
                    foreign_module));
   } else {
     fail(Failed::Why::NoReply,
-         formatted("pivot module %u does not answer: check its 24 V logic supply, the CAN cable, the bit rate and "
-                   "pivot.module_id",
+         formatted("pivot module %u does not answer: check its 24 V logic supply, the CAN cable, the bit rate, "
+                   "pivot.module_id and pivot.protocol",
                    id));
   }
   garbled = 0;
@@ -140,66 +147,51 @@ void Session::Impl::late_replies(Duration round_trip) {
   identify(kQuiet);
 }
 
-void Session::Impl::on_identity(const Value& value) {
-  const auto number = [&value] { return static_cast<double>(std::get<float>(value.value)); };
-  switch (value.parameter) {
-    case Parameter::Firmware:
-      module.firmware = std::get<std::uint16_t>(value.value);
-      break;
-    case Parameter::SerialNumber:
-      module.serial = std::get<std::uint32_t>(value.value);
-      break;
-    case Parameter::Config:
-      config_word = std::get<std::uint32_t>(value.value);
-      break;
-    case Parameter::PositionMin:
-      module.position_min = Angle::rad(number());
-      break;
-    case Parameter::PositionMax:
-      module.position_max = Angle::rad(number());
-      break;
-    case Parameter::VelocityMax:
-      module.velocity_max_rad_s = number();
-      break;
-    case Parameter::AccelerationMax:
-      module.acceleration_max_rad_s2 = number();
-      break;
-    case Parameter::StateWord:
-      word = std::get<std::uint32_t>(value.value);
-      break;
-    default:
-      break;
-  }
-  if (++identity_index < kIdentity.size()) return;
-  if (std::exchange(repeated, false)) {  // once more, when late answers would have come
-    --identity_index;
-    step_at = now + kQuiet;
+void Session::Impl::on_identity(const Ask& ask, const Answer& answer) {
+  if (ask.what == Ask::What::Identity) {
+    protocol->learn(ask.step, answer);
+    ++identity_index;
     return;
   }
+  if (!answer.state) return;
+  word = answer.state->word;
+  code = answer.state->code;
+  if (std::exchange(repeated, false)) {
+    step_at = now + kQuiet;  // once more, when late answers would have come
+    return;
+  }
+  on_identified();
+}
+
+void Session::Impl::on_identified() {
   identity_index = 0;
   shorts = to_short_state(word);
+  module = protocol->module();
   identified = true;
   if (const std::string problem = module_problem(); !problem.empty()) {
     fail(Failed::Why::ModuleError, problem);
     return identify(kQuiet);
   }
   if (!std::exchange(seen_before, true))
-    BINPICK_LOG(Info, "pivot", "module %u: firmware %04X, serial %u, %.1f to %.1f deg, at most %.0f deg/s; %s",
-                unsigned{options.module_id}, unsigned{module.firmware}, module.serial, module.position_min.in_deg(),
-                module.position_max.in_deg(), degrees(module.velocity_max_rad_s), state_in_words(word).c_str());
+    BINPICK_LOG(Info, "pivot", "module %u%s%s: firmware %04X, serial %u, %.1f to %.1f deg, at most %.0f deg/s; %s",
+                unsigned{options.module_id}, module.type.empty() ? "" : ", ", module.type.c_str(),
+                unsigned{module.firmware}, module.serial, module.position_min.in_deg(), module.position_max.in_deg(),
+                degrees(module.velocity_max_rad_s), pivot::state_in_words(word).c_str());
   watchdog_at = now;
   if (!options.identify_only) return go_on_from_state();
   if (!std::exchange(told_identity, true) || failed) tell(Ready{module});
   failed.reset();
-  identity_index = kIdentity.size() - 1;  // the state again and again, and nothing else
+  identity_index = protocol->identity_steps();  // the state again and again, and nothing else
   step_at = now + kStatePollPassive;
 }
 
 std::string Session::Impl::module_problem() const {
-  if ((config_word & config_bit::kLinear) != 0)
-    return "the module is a linear axis, not a pivot: is pivot.module_id right?";
-  if (!(module.position_min < module.position_max) || !(module.velocity_max_rad_s > 0) ||
-      !(module.acceleration_max_rad_s2 > 0))
+  if (std::string problem = protocol->problem(); !problem.empty()) return problem;
+  const auto is_limit = [](double value) { return value >= kLimitMin && value <= kLimitMax; };
+  const auto is_angle = [](Angle angle) { return std::abs(angle.in_rad()) <= kLimitMax; };
+  if (!(module.position_min < module.position_max) || !is_angle(module.position_min) ||
+      !is_angle(module.position_max) || !is_limit(module.velocity_max_rad_s) ||
+      !is_limit(module.acceleration_max_rad_s2))
     return formatted(
         "the module's limits make no sense (%.3f to %.3f rad, %.3f rad/s, %.3f rad/s2): set them with the "
         "vendor's tool",
@@ -208,12 +200,19 @@ std::string Session::Impl::module_problem() const {
   return {};
 }
 
-void Session::Impl::on_command_done(const Request& request) {
-  if (const auto* plain = std::get_if<Plain>(&request); plain != nullptr && phase == Phase::Recover)
-    step_at = now + (plain->command == Command::Reset ? kResetSettle : Duration{0});
+void Session::Impl::on_command_done(const Ask& ask) {
+  if (ask.what == Ask::What::Prepare) ++prepared;
+  if (ask.what == Ask::What::Go) {
+    setpoints_missed = 0;
+    accepted_rad = ask.to.position_rad;
+  }
+  if (phase == Phase::Recover) step_at = now + (ask.what == Ask::What::Reset ? kResetSettle : Duration{0});
 }
 
-void Session::Impl::on_state_word() {
+void Session::Impl::on_state(const ModuleState& heard) {
+  word = heard.word;
+  code = heard.code;
+  shorts = to_short_state(word);
   switch (phase) {
     case Phase::Offline:
     case Phase::Identify:
@@ -240,17 +239,19 @@ void Session::Impl::on_state_recovering() {
   if (now >= reset_at) {
     reset_at = now + kResetPeriod;
     step_at = now + kResetSettle;
-    send(Plain{Command::Reset});
+    owe(Ask::What::Reset);
   }
 }
 
 void Session::Impl::on_state_referencing() {
   if ((word & state::kFaults) != 0) {
-    if ((word & state::kMotorSupply) == 0) return reference_failed("reference run failed: " + faults_in_words(word));
+    if ((word & state::kMotorSupply) == 0)
+      return reference_failed("reference run failed: " + faults_in_words(ModuleState{word, code}));
     fail_by_state(Failed::Why::PowerFault);
     return recover(true);
   }
   if ((word & state::kHalt) != 0) return home_pending ? recover(false) : reference_failed("reference run was halted");
+  if (!reference_refused.empty()) return reference_failed(reference_refused);
   constexpr std::uint32_t kDone = state::kHomeOk | state::kRampEnd;
   if (!home_pending && (word & kDone) == kDone && (word & state::kMotion) == 0) be_ready();
 }

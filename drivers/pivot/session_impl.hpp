@@ -6,12 +6,13 @@
 #include <string>
 #include <vector>
 
-#include "drivers/pivot/codec.hpp"
+#include "drivers/pivot/protocol.hpp"
 #include "drivers/pivot/session.hpp"
 #include "drivers/pivot/setpoints.hpp"
 
-/// The inside of the pivot's session, in three files: session.cpp (requests and replies), session_bringup.cpp (until it
-/// is ready, and again after a fault), session_work.cpp (positions and moves).
+/// The inside of the pivot's session, in three files: session.cpp (asks and answers), session_bringup.cpp (until it is
+/// ready, and again after a fault), session_work.cpp (positions and moves). What a module speaks is behind
+/// protocol.hpp.
 namespace binpick::drivers::pivot {
 using namespace std::chrono_literals;
 
@@ -34,9 +35,15 @@ struct Session::Impl {
   enum class Phase { Offline, Identify, Recover, Reference, Stand, Move };
   enum class Halt { None, Stopping, Resetting };  // after stop(): HALT, stand, RESET
   struct Outstanding {
-    Request request;
+    Ask ask;
     TimePoint sent_at, give_up_at;
     int attempts = 1;
+  };
+  /// To be sent before anything else, as soon as the module can bear another frame.
+  struct Owed {
+    Ask ask;
+    int attempts = 1;
+    bool answer_matters = true;
   };
 
   explicit Impl(const Options& o);
@@ -49,22 +56,28 @@ struct Session::Impl {
   Failed::Why why_so_far() const;
   static std::string bus_off_text();
 
-  // Requests and replies.
-  void send(const Request& request, int attempts = 1);
+  // Asks and answers.
+  void owe(Ask::What what, bool answer_matters = true);
+  void send(const Owed& owed);
   void pump();
-  std::optional<Request> next_request();
-  void on_reply(const Reply& reply, TimePoint received_at);
-  /// Whether a position is the answer to the request it seems to answer, and not a late one to an earlier request.
-  bool is_sure(int attempts, const Value& value);
-  void on_unexpected(const Reply& reply);
-  void on_no_reply();
+  std::optional<Ask> next_ask();
+  void on_answer(const Answer& answer, TimePoint received_at);
+  /// Whether a position is the answer to the ask it seems to answer, and not a late one to an earlier ask.
+  bool is_sure(int attempts, const Answer& answer);
+  /// Whether `ask` is answered as a position is, so that a late answer may be taken for one.
+  bool looks_like_position(const Ask& ask) const;
+  void on_unexpected(const Answer& answer);
+  void on_no_answer();
+  void on_refused(const Ask& ask, const Answer& answer);
+  void on_other_master();
+  void on_blocked(double position);
   void on_frame(const CanFrame& frame, TimePoint received_at);
   void on_error_frame(const CanFrame& frame);
   void on_time();
   std::optional<TimePoint> deadline() const;
 
   // Bring-up: identify, recover, reference.
-  std::optional<Request> next_request_bringing_up();
+  std::optional<Ask> next_ask_bringing_up();
   void be_ready();
   void identify(Duration pause);
   void recover(bool with_halt);
@@ -74,16 +87,18 @@ struct Session::Impl {
   void go_on_from_state();
   void lost();
   void late_replies(Duration round_trip);
-  void on_identity(const Value& value);
+  void on_identity(const Ask& ask, const Answer& answer);
+  void on_identified();
   std::string module_problem() const;
-  void on_command_done(const Request& request);
-  void on_state_word();
+  void on_command_done(const Ask& ask);
+  void on_state(const ModuleState& heard);
   void on_state_recovering();
   void on_state_referencing();
 
   // At work: positions, moves, stops.
   void drop_move();
-  std::optional<Request> next_request_at_work();
+  std::optional<Ask> next_ask_at_work();
+  std::optional<Ask> next_setpoint();
   void start_move(double from, double speed_from);
   void on_state_at_work();
   void on_state_halting();
@@ -96,7 +111,10 @@ struct Session::Impl {
   Options options;
   Duration cycle{};
   Phase phase = Phase::Offline;
+  std::unique_ptr<ModuleProtocol> protocol;
   std::optional<Outstanding> outstanding;
+  std::optional<Owed> owed;
+  TimePoint write_at{};  ///< Not before, for a module that cannot bear frames on one another's heels.
   std::vector<CanFrame> out;
   std::deque<Event> events;
   std::optional<Failed::Why> failed;  ///< Told to the cell and not yet followed by Ready.
@@ -105,8 +123,8 @@ struct Session::Impl {
   // What the module said.
   std::size_t identity_index = 0;
   ModuleInfo module;
-  std::uint32_t config_word = 0;
   std::uint32_t word = 0;  ///< Last state word.
+  std::uint8_t code = 0;   ///< Its error's own code, where the protocol has one.
   std::uint8_t shorts = 0;
   bool identified = false;   ///< Module and word are of a real module.
   bool seen_before = false;  ///< It was logged.
@@ -121,13 +139,16 @@ struct Session::Impl {
   bool home_pending = false;
   bool state_next = false;  ///< Firmware without parameter 62: the state follows each position.
   int references_failed = 0;
+  std::string reference_refused;  ///< Why the module did not begin it.
 
   // The move.
   Halt halt = Halt::None;
   std::optional<std::pair<double, double>> goal;  ///< Target and speed, until it is planned.
   std::optional<SetpointStream> stream;
-  double stream_speed = 0;  ///< Wanted, should the rest of the way be planned again.
+  double stream_speed = 0;   ///< Wanted, should the rest of the way be planned again.
+  std::size_t prepared = 0;  ///< Settings before the move that the module has taken.
   TimePoint last_setpoint_at{};
+  std::optional<double> accepted_rad;  ///< The set-point that the module took last.
   int setpoints_missed = 0;
   std::optional<Sample> last_sample;
 

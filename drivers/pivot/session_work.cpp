@@ -19,46 +19,57 @@ void Session::Impl::drop_move() {
   goal.reset();
   stream.reset();
   setpoints_missed = 0;
+  accepted_rad.reset();
 }
 
-std::optional<Request> Session::Impl::next_request_at_work() {
+std::optional<Ask> Session::Impl::next_ask_at_work() {
+  Ask ask;
   if (halt != Halt::None && now >= step_at) {
     step_at = now + kStatePoll;
-    return Get{Parameter::StateWord};
+    return ask;
   }
-  if (stream && now >= setpoint_at) {
-    const bool settled = last_setpoint_at >= stream->end();
-    if (last_setpoint_at != TimePoint{} && !settled && now - last_setpoint_at > options.setpoint_horizon) {
-      // The module has run out of set-points and stands: going on with the old ramp would be a jump.
-      goal = {stream->target(), stream_speed};
-      stream.reset();
-      setpoint_at = now + cycle;
-    } else {
-      setpoint_at = now + (now >= stream->end() ? kSettle : cycle);
-      if ((shorts & short_state::kBufferFull) == 0) {
-        last_setpoint_at = now;
-        const Setpoint next = stream->at(now);
-        const double clamped =
-            std::clamp(next.position_rad, module.position_min.in_rad(), module.position_max.in_rad());
-        return pivot::Move{Motion::Step, static_cast<float>(clamped), next.time_ms};
-      }
-    }
-  }
-  if (state_next) {
-    state_next = false;
-    return Get{Parameter::StateWord};
-  }
+  if (stream && now >= setpoint_at)
+    if (auto setpoint = next_setpoint()) return setpoint;
+  if (std::exchange(state_next, false)) return ask;
   if (now >= sample_at) {
     sample_at = std::max(sample_at + options.sample_period, now + options.sample_period / 2);
-    if (has_position_and_state(module.firmware)) return Get{Parameter::PositionAndState};
-    state_next = true;
-    return Get{Parameter::Position};
+    ask.what = Ask::What::Position;
+    state_next = !protocol->position_has_state();
+    return ask;
   }
   if (now >= state_at) {
     state_at = now + (phase == Phase::Move ? kStatePollMoving : kStatePollStanding);
-    return Get{Parameter::StateWord};
+    return ask;
   }
   return std::nullopt;
+}
+
+std::optional<Ask> Session::Impl::next_setpoint() {
+  Ask ask;
+  if (prepared < protocol->prepare_steps()) {
+    ask.what = Ask::What::Prepare;
+    ask.step = prepared;
+    ask.speed = stream_speed;
+    ask.acceleration = stream->acceleration();
+    return ask;
+  }
+  if (last_setpoint_at == TimePoint{}) stream->begin(now);  // preparing took its time
+  const bool settled = last_setpoint_at >= stream->end();
+  if (last_setpoint_at != TimePoint{} && !settled && now - last_setpoint_at > options.setpoint_horizon) {
+    // The module has run out of set-points and stands: going on with the old ramp would be a jump.
+    goal = {stream->target(), stream_speed};
+    stream.reset();
+    setpoint_at = now + cycle;
+    return std::nullopt;
+  }
+  setpoint_at = now + (now >= stream->end() ? kSettle : cycle);
+  if ((shorts & short_state::kBufferFull) != 0) return std::nullopt;
+  last_setpoint_at = now;
+  ask.what = Ask::What::Go;
+  ask.to = protocol->setpoint(*stream, now);
+  ask.to.position_rad = std::clamp(ask.to.position_rad, module.position_min.in_rad(), module.position_max.in_rad());
+  if (!protocol->repeats_setpoints() && accepted_rad == ask.to.position_rad) return std::nullopt;
+  return ask;
 }
 
 void Session::Impl::start_move(double from, double speed_from) {
@@ -71,6 +82,8 @@ void Session::Impl::start_move(double from, double speed_from) {
   last_setpoint_at = {};
   setpoint_at = now;
   setpoints_missed = 0;
+  prepared = 0;
+  accepted_rad.reset();
 }
 
 void Session::Impl::on_state_at_work() {
@@ -100,7 +113,7 @@ void Session::Impl::on_state_halting() {
     halt = Halt::Resetting;
     reset_at = now + kResetPeriod;
     step_at = now + kStatePoll;
-    send(Plain{Command::Reset});
+    owe(Ask::What::Reset);
   }
 }
 
@@ -159,7 +172,7 @@ void Session::Impl::stop() {
     recover(false);
   }
   if (phase == Phase::Identify || (phase == Phase::Recover && !referencing)) {
-    out.push_back(encode(options.module_id, Plain{Command::Halt}));
+    owe(Ask::What::Halt, false);
     return;
   }
   outstanding.reset();  // a HALT waits for no reply; what was asked before may be answered or not
@@ -167,6 +180,6 @@ void Session::Impl::stop() {
     halt = Halt::Stopping;
     step_at = now + kStatePoll;
   }
-  send(Plain{Command::Halt});
+  owe(Ask::What::Halt);
 }
 }  // namespace binpick::drivers::pivot

@@ -6,7 +6,8 @@
 namespace binpick::drivers::pivot {
 namespace {
 constexpr double kStepMargin_s = 0.010;  // a step must outlast the wait for the next one by this much
-}
+constexpr double kCyclesAhead = 3;       // a lost set-point, and the next one late, must not make the module brake
+}  // namespace
 
 Setpoint SetpointStream::at(TimePoint now) const {
   const double t = in_s(now - start_);
@@ -26,5 +27,12 @@ Setpoint SetpointStream::at(TimePoint now) const {
     in_s = std::clamp(left / speed, shortest_s, horizon_s);
   }
   return {to, static_cast<std::uint16_t>(std::clamp(std::lround(in_s * 1e3), 1L, 65535L))};
+}
+
+Setpoint SetpointStream::ahead(TimePoint now) const {
+  // Braking from `speed` takes speed / acceleration, half of which is lost against driving on to the same point.
+  const double half_braking_s = ramp_.speed_max() / (2 * ramp_.acceleration());
+  const double ahead_s = std::max(in_s(horizon_) - half_braking_s, half_braking_s + kCyclesAhead * in_s(cycle_));
+  return {ramp_.position(in_s(now - start_) + ahead_s), 0};
 }
 }  // namespace binpick::drivers::pivot

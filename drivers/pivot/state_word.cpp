@@ -2,6 +2,8 @@
 
 #include <array>
 
+#include "drivers/pivot/motion_errors.hpp"
+
 namespace binpick::drivers::pivot {
 namespace {
 struct Bit {
@@ -70,6 +72,11 @@ std::string faults_in_words(std::uint32_t state_word) {
   if (text.empty() && (state_word & state::kError) != 0)
     text = "an error that the module does not name (switch the module off and on if it stays)";
   return text;
+}
+
+std::string faults_in_words(const ModuleState& module) {
+  const bool fault = (module.word & (state::kFaults | state::kHalt)) != 0;
+  return fault && module.code != 0 ? motion::error_in_words(module.code) : faults_in_words(module.word);
 }
 
 std::string state_in_words(std::uint32_t state_word) {

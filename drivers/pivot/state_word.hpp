@@ -3,7 +3,8 @@
 #include <cstdint>
 #include <string>
 
-/// The module's state word (parameter 27) and short state, as bits and in words.
+/// The module's state word and short state, as bits and in words. The bits are PowerCube's (parameter 27); what a
+/// module says in the Motion Protocol is put into the same bits (motion_errors.hpp), so that one session serves both.
 /// Source: schunk_libm5api, m5apiw32.h; schunk_powercube_chain, PowerCubeCtrl.cpp (remedies).
 namespace binpick::drivers::pivot {
 namespace state {
@@ -61,6 +62,13 @@ std::string faults_in_words(std::uint32_t state_word);
 /// Every set bit by name, for the log and for `binpick probe`: "referenced, ramp finished".
 std::string state_in_words(std::uint32_t state_word);
 std::string short_state_in_words(std::uint8_t short_state);
+
+/// What is known of a module's state.
+struct ModuleState {
+  std::uint32_t word = 0;
+  std::uint8_t code = 0;  ///< Motion Protocol: the error's code, which says more than the bits; else 0.
+};
+std::string faults_in_words(const ModuleState& module);
 
 /// The short state that belongs to a state word (the emulator's half).
 constexpr std::uint8_t to_short_state(std::uint32_t word) {

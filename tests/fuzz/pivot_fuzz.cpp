@@ -7,10 +7,12 @@
 
 #include "base/log.hpp"
 #include "drivers/pivot/codec.hpp"
+#include "drivers/pivot/motion_codec.hpp"
 #include "drivers/pivot/session.hpp"
 #include "drivers/pivot/state_word.hpp"
 
-/// Arbitrary frames at arbitrary times: both decoders, and a session that also gets link changes, moves and stops.
+/// Arbitrary frames at arbitrary times: both decoders, and a session in either protocol that also gets link changes,
+/// moves and stops. (Messages of the Motion Protocol by themselves: motion_fuzz.cpp.)
 namespace {
 using namespace binpick;
 using namespace binpick::drivers::pivot;
@@ -25,15 +27,15 @@ struct Input {
   }
 };
 
-CanFrame frame_from(Input& input) {
+CanFrame frame_from(Input& input, std::uint32_t reply_base) {
   CanFrame frame;
   const std::uint8_t kind = input.byte();
   frame.extended = kind == 0xF0;
   frame.rtr = kind == 0xF1;
   frame.error = (kind & 0xF8) == 0xE0;
   frame.id = frame.error       ? std::uint32_t{input.byte()} << (kind & 3)
-             : (kind & 1) != 0 ? kReplyBase + 12U
-                               : kReplyBase + 12U + input.byte();
+             : (kind & 1) != 0 ? reply_base + 12U
+                               : reply_base + 12U + input.byte();
   frame.length = std::min<std::uint8_t>(kind >> 4, 8);
   for (std::size_t i = 0; i < frame.length; ++i) frame.payload[i] = input.byte();
   return frame;
@@ -41,6 +43,40 @@ CanFrame frame_from(Input& input) {
 
 void require(bool condition) {
   if (!condition) std::abort();
+}
+
+/// What we send is always a proper request. Angles may be whole numbers, as the module's unit system says.
+bool is_request(Protocol protocol, const CanFrame& frame) {
+  if (protocol == Protocol::PowerCube) return static_cast<bool>(decode_request(12, frame));
+  motion::Assembler assembler;
+  const auto message = assembler.take(frame);
+  if (frame.id != motion::kCommandBase + 12 || !message || !*message) return false;
+  return decode_request(**message, motion::UnitSystem::Degree) ||
+         decode_request(**message, motion::UnitSystem::Millidegree);
+}
+
+CanFrame motion_answer_to(const CanFrame& asked, Input& input) {
+  CanFrame frame;
+  frame.id = motion::kReplyBase + 12;
+  frame.payload[1] = asked.payload[1];
+  const auto fill = [&](std::size_t from, std::uint8_t length) {
+    frame.length = length;
+    frame.payload[0] = static_cast<std::uint8_t>(length - 1);
+    for (std::size_t i = from; i < length; ++i) frame.payload[i] = input.byte();
+  };
+  if (asked.payload[1] == 0x95) {
+    fill(2, 8);
+  } else if (asked.payload[1] == 0x80 && asked.length == 3) {
+    frame.payload[2] = asked.payload[2];
+    fill(3, asked.payload[2] == 0x06 ? 4 : 7);
+  } else if (asked.payload[1] == 0x80) {
+    fill(2, 3);
+  } else {
+    fill(8, 4);
+    frame.payload[2] = 'O';
+    frame.payload[3] = 'K';
+  }
+  return frame;
 }
 
 /// An answer that fits what was just asked, with a value from the input: so that the session gets past its first steps.
@@ -69,7 +105,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   log::set_threshold(log::Level::Error);
   Input input{{data, size}};
   Options options;
-  options.identify_only = (input.byte() & 7) == 7;
+  const std::uint8_t first = input.byte();
+  options.identify_only = (first & 7) == 7;
+  const bool motion = (first & 8) != 0;
+  options.protocol = motion ? Protocol::Motion : Protocol::PowerCube;
   Session session{options};
   TimePoint now{std::chrono::hours(1)};
   session.on_link_up(now);
@@ -81,7 +120,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       ++frames;
       last = frame;
       require(!frame.extended && !frame.rtr && !frame.error && frame.length <= 8);
-      require(static_cast<bool>(decode_request(12, frame)));  // what we send is always a proper request
+      require(is_request(options.protocol, frame));
     }
     switch (what & 15) {
       case 0:
@@ -99,7 +138,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       case 4:
       case 5:
       case 6: {
-        const CanFrame frame = frame_from(input);
+        const CanFrame frame = frame_from(input, motion ? motion::kReplyBase : kReplyBase);
         static_cast<void>(decode_request(12, frame));
         if (const auto reply = decode_reply(12, frame); !reply) static_cast<void>(to_string(reply.error()));
         session.on_frame(frame, now - std::chrono::microseconds(input.byte()));
@@ -119,7 +158,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       default:
         if (last.length > 0) {
           now += std::chrono::microseconds(300);
-          session.on_frame(answer_to(last, input), now);
+          session.on_frame(motion ? motion_answer_to(last, input) : answer_to(last, input), now);
         }
         break;
     }
@@ -130,7 +169,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     }
     while (const auto event = session.take_event())
       if (const auto* failed = std::get_if<Failed>(&*event)) require(!failed->text.empty());
-    static_cast<void>(state_in_words(session.state_word()));
+    static_cast<void>(session.state_in_words());
   }
   require(frames < 64 + 40 * (size + 8));  // no flood
   return 0;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "drivers/pivot/motion_errors.hpp"
 #include "drivers/pivot/state_word.hpp"
 
 namespace binpick::emulators {
@@ -17,6 +18,9 @@ constexpr Duration kTick = 10ms;  // while it moves, faults are looked for this 
 constexpr Duration kReferenceSettle = 50ms;
 constexpr Duration kLoose = 1s;  // how long a connector stays open after disconnect_after_bytes
 constexpr double kHomeSwitch_rad = 0.02;
+
+/// Of its maxima that a module begins with; the Motion Protocol's manual says 10 %.
+double start_share(const PivotOptions& options) { return options.protocol == Protocol::Motion ? 0.1 : 1.0; }
 
 CanFrame error_frame(std::uint32_t classes) {
   CanFrame frame;
@@ -33,14 +37,15 @@ Pivot::Pivot(const PivotOptions& options)
       zero_rad_{options.referenced ? 0.0 : options.start.in_rad()},
       home_ok_{options.referenced},
       moved_{options.referenced},
-      ramp_velocity_{static_cast<float>(options.velocity_max_rad_s)},
-      ramp_acceleration_{static_cast<float>(options.acceleration_max_rad_s2)},
+      ramp_velocity_{start_share(options) * options.velocity_max_rad_s},
+      ramp_acceleration_{start_share(options) * options.acceleration_max_rad_s2},
+      cyclic_{options.cyclic},
       random_{options.seed} {}
 
 std::uint32_t Pivot::state_word(TimePoint at) const {
   std::uint32_t word = latched_;
   if (faults.emergency_stop) word |= state::kError | state::kPowerFault | state::kMotorVoltage;
-  if (faults.error_code) word |= state::kError | *faults.error_code;
+  word |= error_bits();
   if (home_ok_) word |= state::kHomeOk;
   if (halted_) word |= state::kHalt;
   if (std::abs(axis_.position(at)) < kHomeSwitch_rad) word |= state::kHomeSwitch;
@@ -69,6 +74,39 @@ bool Pivot::may_move() const {
   return !halted_ && home_ok_ && !reference_end_ && latched_ == 0 && !faults.emergency_stop && !faults.error_code;
 }
 
+std::uint32_t Pivot::error_bits() const {
+  if (!faults.error_code) return 0;
+  if (options_.protocol == Protocol::PowerCube) return state::kError | *faults.error_code;
+  return motion::error_bits(static_cast<std::uint8_t>(*faults.error_code));
+}
+
+void Pivot::halt(TimePoint now) {
+  halted_ = options_.protocol == Protocol::PowerCube || options_.fast_stop_is_error;
+  reference_end_.reset();
+  axis_.brake(options_.brake_rad_s2, now);
+}
+
+void Pivot::reset() {
+  if (faults.emergency_stop || faults.error_code) return;
+  latched_ = 0;
+  halted_ = false;
+}
+
+bool Pivot::start_reference_run(TimePoint now) {
+  if (halted_ || latched_ != 0 || faults.emergency_stop || faults.error_code) return false;
+  ++reference_runs_;
+  home_ok_ = false;
+  moved_ = true;
+  axis_.ramp_to(home_switch_broken ? kHardStop_rad : 0.0, options_.home_velocity_rad_s,
+                options_.acceleration_max_rad_s2, now);
+  reference_end_ = axis_.leg_end(now) + kReferenceSettle;
+  return true;
+}
+
+double Pivot::clamped(double target) const {
+  return std::clamp(target, options_.position_min.in_rad(), options_.position_max.in_rad()) + zero_rad_;
+}
+
 void Pivot::trip(std::uint32_t bits, TimePoint now) {
   latched_ |= bits | state::kError;
   reference_end_.reset();
@@ -93,7 +131,7 @@ void Pivot::update(TimePoint now) {
   if (!faults.emergency_stop && stopped_before_)
     latched_ &= ~state::kMotorVoltage;  // the voltage is back; the rest stays
   stopped_before_ = faults.emergency_stop;
-  if (faults.error_code && (latched_ & *faults.error_code) != *faults.error_code) trip(*faults.error_code, now);
+  if ((latched_ & error_bits()) != error_bits()) trip(error_bits(), now);
   if (watchdog_until_ && now >= *watchdog_until_) {
     watchdog_until_.reset();
     if (axis_.moving(now)) {
@@ -101,6 +139,7 @@ void Pivot::update(TimePoint now) {
       trip(state::kWatchdog, now);
     }
   }
+  if (options_.protocol == Protocol::Motion) update_motion(now);
 }
 
 void Pivot::end_reference_run(TimePoint now) {
@@ -121,159 +160,18 @@ void Pivot::power_cycle(TimePoint now, Duration off) {
   reference_end_.reset();
   watchdog_until_.reset();
   due_.clear();
+  cyclic_.reset();
+  arrives_at_.reset();
+  hurried_ = false;
+  ramp_velocity_ = start_share(options_) * options_.velocity_max_rad_s;
+  ramp_acceleration_ = start_share(options_) * options_.acceleration_max_rad_s2;
+  if (options_.protocol == Protocol::Motion) say(motion::Info{motion::info_code::kBoot}, off_until_);
 }
 
-float Pivot::reported(TimePoint at) const {
+double Pivot::reported(TimePoint at) const {
   const double step = options_.encoder_step.in_rad();
   const double exact = axis_.position(at) - zero_rad_;
-  return static_cast<float>(step > 0 ? std::round(exact / step) * step : exact);
-}
-
-Value Pivot::value_of(Parameter parameter, TimePoint now) const {
-  const TimePoint read_at = now + options_.reaction / 2;
-  const auto f32 = [](double v) { return static_cast<float>(v); };
-  switch (parameter) {
-    case Parameter::SerialNumber:
-      return {parameter, options_.serial};
-    case Parameter::Firmware:
-      return {parameter, options_.firmware};
-    case Parameter::StateWord:
-      return {parameter, state_word(read_at)};
-    case Parameter::Config:
-      return {parameter, options_.config_word};
-    case Parameter::Setup:
-      return {parameter, options_.setup_word};
-    case Parameter::Position:
-      return {parameter, reported(read_at)};
-    case Parameter::PositionAndState:
-      return {parameter, PositionReport{reported(read_at), to_short_state(state_word(read_at)), 0}};
-    case Parameter::FollowingErrorMax:
-      return {parameter, f32(options_.following_error_max_rad)};
-    case Parameter::Velocity:
-      return {parameter, f32(axis_.speed(read_at))};
-    case Parameter::PositionMin:
-      return {parameter, f32(options_.position_min.in_rad())};
-    case Parameter::PositionMax:
-      return {parameter, f32(options_.position_max.in_rad())};
-    case Parameter::VelocityMax:
-      return {parameter, f32(options_.velocity_max_rad_s)};
-    case Parameter::AccelerationMax:
-      return {parameter, f32(options_.acceleration_max_rad_s2)};
-    case Parameter::CurrentMax:
-      return {parameter, 8.0F};
-    case Parameter::Current:
-      return {parameter, axis_.moving(read_at) ? 1.0F : 0.0F};
-    case Parameter::RampVelocity:
-      return {parameter, ramp_velocity_};
-    case Parameter::RampAcceleration:
-      return {parameter, ramp_acceleration_};
-    case Parameter::HomeOffset:
-      return {parameter, 0.0F};
-    case Parameter::HomeVelocity:
-      return {parameter, f32(options_.home_velocity_rad_s)};
-  }
-  return {parameter, 0.0F};
-}
-
-void Pivot::step(double target, Duration time, TimePoint now) {
-  const double seconds = std::max(in_s(time), 1e-3);
-  const double speed = (target - axis_.position(now)) / seconds;
-  const double jump = std::abs(speed - axis_.speed(now));
-  // A motor that accelerates as hard as it can lags behind a jump of speed by so much.
-  const double lag = jump * jump / (2 * options_.acceleration_max_rad_s2);
-  const bool queue = options_.steps == PivotOptions::Steps::Queue && axis_.moving(now);
-  if (!queue && (lag > options_.following_error_max_rad || std::abs(speed) > 1.5 * options_.velocity_max_rad_s))
-    return trip(state::kTow, now);
-  moved_ = true;
-  if (queue)
-    axis_.queue_line(target, time, now);
-  else
-    axis_.line_to(target, time, now);
-}
-
-void Pivot::obey_move(const Move& move, TimePoint now) {
-  if (!may_move()) return;
-  const double min = options_.position_min.in_rad();
-  const double max = options_.position_max.in_rad();
-  const double value = static_cast<double>(move.value);
-  const double real = std::clamp(value, min, max) + zero_rad_;
-  const double acceleration = static_cast<double>(ramp_acceleration_);
-  switch (move.motion) {
-    case Motion::Step:
-    case Motion::StepExtended:
-      return step(real, std::chrono::milliseconds(move.time_ms), now);
-    case Motion::Ramp:
-    case Motion::RampExtended:
-      moved_ = true;
-      return axis_.ramp_to(real, static_cast<double>(ramp_velocity_), acceleration, now);
-    case Motion::Velocity:
-    case Motion::VelocityExtended: {
-      moved_ = true;
-      const double speed = std::min(std::abs(value), options_.velocity_max_rad_s);
-      if (speed < 1e-6) return axis_.brake(acceleration, now);
-      return axis_.ramp_to((value > 0 ? max : min) + zero_rad_, speed, acceleration, now);
-    }
-    case Motion::Current:
-    case Motion::CurrentExtended:
-      return;  // no load is emulated that a torque could move
-  }
-}
-
-void Pivot::obey_plain(Command command, TimePoint now) {
-  if (command == Command::Halt) {
-    halted_ = true;
-    reference_end_.reset();
-    axis_.brake(options_.brake_rad_s2, now);
-  } else if (command == Command::Reset) {
-    if (faults.emergency_stop || faults.error_code) return;
-    latched_ = 0;
-    halted_ = false;
-  } else if (command == Command::Home) {
-    if (halted_ || latched_ != 0 || faults.emergency_stop || faults.error_code) return;
-    ++reference_runs_;
-    home_ok_ = false;
-    moved_ = true;
-    axis_.ramp_to(home_switch_broken ? kHardStop_rad : 0.0, options_.home_velocity_rad_s,
-                  options_.acceleration_max_rad_s2, now);
-    reference_end_ = axis_.leg_end(now) + kReferenceSettle;
-  }
-}
-
-void Pivot::reply(const Reply& reply, TimePoint now, bool write) {
-  if (write && (options_.config_word & config_bit::kSuppressAcknowledge) != 0) return;
-  due_.push_back(Due{now + options_.reaction + faults.delay, encode(options_.module_id, reply)});
-  std::ranges::stable_sort(due_, {}, &Due::at);
-}
-
-void Pivot::obey(const Request& request, TimePoint now) {
-  if (const auto* get = std::get_if<Get>(&request)) {
-    if (get->parameter == Parameter::PositionAndState && !has_position_and_state(options_.firmware)) return;
-    return reply(value_of(get->parameter, now), now, false);
-  }
-  if (const auto* set = std::get_if<Set>(&request)) {
-    if (const auto* number = std::get_if<float>(&set->value)) {
-      if (set->parameter == Parameter::RampVelocity)
-        ramp_velocity_ = std::clamp(*number, 0.001F, static_cast<float>(options_.velocity_max_rad_s));
-      if (set->parameter == Parameter::RampAcceleration)
-        ramp_acceleration_ = std::clamp(*number, 0.001F, static_cast<float>(options_.acceleration_max_rad_s2));
-    }
-    return reply(SetDone{set->parameter}, now, true);
-  }
-  if (const auto* plain = std::get_if<Plain>(&request)) {
-    obey_plain(plain->command, now);
-    return reply(PlainDone{plain->command}, now, true);
-  }
-  if (const auto* move = std::get_if<Move>(&request)) {
-    obey_move(*move, now);
-    MoveAccepted accepted{move->motion, std::nullopt};
-    if (is_extended(move->motion)) {
-      const TimePoint read_at = now + options_.reaction / 2;
-      accepted.report = PositionReport{reported(read_at), to_short_state(state_word(read_at)), 0};
-    }
-    return reply(accepted, now, !is_extended(move->motion));
-  }
-  if (std::get<Broadcast>(request).command == Command::Watchdog && (options_.config_word & config_bit::kWatchdog) != 0)
-    watchdog_until_ = now + options_.watchdog;
+  return step > 0 ? std::round(exact / step) * step : exact;
 }
 
 void Pivot::on_frame(const CanFrame& frame, TimePoint now) {
@@ -283,7 +181,13 @@ void Pivot::on_frame(const CanFrame& frame, TimePoint now) {
     return;
   }
   if (faults.unplugged || now < loose_until_ || now < off_until_) return;
+  if (options_.protocol == Protocol::Motion) return on_motion_frame(frame, now);
   if (const auto request = decode_request(options_.module_id, frame)) obey(*request, now);
+}
+
+void Pivot::send_in_time(const CanFrame& frame, TimePoint now) {
+  due_.push_back(Due{now + options_.reaction + faults.delay, frame});
+  std::ranges::stable_sort(due_, {}, &Due::at);
 }
 
 void Pivot::corrupt(CanFrame& frame) {
@@ -322,6 +226,7 @@ std::optional<TimePoint> Pivot::deadline() const {
   if (reference_end_) at = earlier(at, reference_end_);
   if (watchdog_until_) at = earlier(at, watchdog_until_);
   if (axis_.moving(now_)) at = earlier(at, now_ + kTick);
+  if (options_.protocol == Protocol::Motion) at = earlier(at, motion_deadline());
   return at;
 }
 

@@ -9,11 +9,15 @@
 #include "base/clock.hpp"
 #include "base/units.hpp"
 #include "drivers/pivot/codec.hpp"
+#include "drivers/pivot/motion_codec.hpp"
+#include "drivers/pivot/motion_message.hpp"
+#include "drivers/pivot/session.hpp"
 #include "tests/emulators/faults.hpp"
 #include "tests/emulators/pivot/axis.hpp"
 
 namespace binpick::emulators {
 struct PivotOptions {
+  drivers::pivot::Protocol protocol = drivers::pivot::Protocol::PowerCube;
   std::uint8_t module_id = 12;
   std::uint16_t firmware = 0x3518;
   std::uint32_t serial = 12345678;
@@ -34,10 +38,22 @@ struct PivotOptions {
   Duration boot = std::chrono::milliseconds(500);
   Duration watchdog = std::chrono::milliseconds(250);          ///< Used when config_word has the watchdog bit.
   enum class Steps { Replace, Queue } steps = Steps::Replace;  ///< What a step does that comes while another runs.
+  // The Motion Protocol alone:
+  drivers::pivot::motion::UnitSystem units = drivers::pivot::motion::UnitSystem::Degree;
+  /// Reports that an earlier program left on.
+  std::optional<drivers::pivot::motion::GetState::Cyclic> cyclic;
+  int ok_before_report =
+      0;                 ///< Every so many-th GET STATE is answered by a mere OK, as modules in the field do; 0: none.
+  bool impulses = true;  ///< 93 and 94 at the end of a move.
+  bool fast_stop_is_error = true;  ///< D9 after a FAST STOP; not confirmed by a public source.
+  /// Frames that come faster silence it until the supply was off, as real ones are said to be; 0: it bears them.
+  Duration hurry{0};
 };
 
-/// A Schunk PR 70 on its CAN bus: answers PowerCube requests and really turns. Frames in, frames out; no clock.
-/// Public sources do not say how a module treats a step that comes while another one runs: both ways can be chosen.
+/// A Schunk PR 70 on its CAN bus: answers in its protocol and really turns. Frames in, frames out; no clock. What
+/// turns, trips and loses its reference is the same in both (pivot.cpp); powercube.cpp and motion.cpp are what they
+/// say. Public sources do not say how a module treats a step that comes while another one runs: both ways can be
+/// chosen.
 class Pivot {
  public:
   explicit Pivot(const PivotOptions& options = {});
@@ -51,7 +67,7 @@ class Pivot {
   Angle angle_at(TimePoint at) const { return Angle::rad(axis_.position(at)); }
   double speed_at(TimePoint at) const { return axis_.speed(at); }
   bool moving(TimePoint at) const { return axis_.moving(at); }
-  std::uint32_t state_word(TimePoint at) const;
+  std::uint32_t state_word(TimePoint at) const;  ///< In the bits of state_word.hpp, whatever it speaks.
   bool referenced() const { return home_ok_; }
   std::uint64_t reference_runs() const { return reference_runs_; }
 
@@ -72,15 +88,34 @@ class Pivot {
   void update(TimePoint now);
   void update_bus();
   void end_reference_run(TimePoint now);
+  // What it does, whoever asks.
+  void halt(TimePoint now);
+  void reset();
+  bool start_reference_run(TimePoint now);
+  void trip(std::uint32_t bits, TimePoint now);
+  std::uint32_t error_bits() const;  ///< Of faults.error_code.
+  double reported(TimePoint at) const;
+  bool may_move() const;
+  double clamped(double target) const;  ///< Inside the soft limits, as a real angle.
+  void send_in_time(const drivers::link::CanFrame& frame, TimePoint now);
+  // PowerCube.
   void obey(const drivers::pivot::Request& request, TimePoint now);
   void obey_plain(drivers::pivot::Command command, TimePoint now);
   void obey_move(const drivers::pivot::Move& move, TimePoint now);
   void step(double target, Duration time, TimePoint now);
-  void trip(std::uint32_t bits, TimePoint now);
   void reply(const drivers::pivot::Reply& reply, TimePoint now, bool write);
   drivers::pivot::Value value_of(drivers::pivot::Parameter parameter, TimePoint now) const;
-  float reported(TimePoint at) const;
-  bool may_move() const;
+  // Motion Protocol.
+  void on_motion_frame(const drivers::link::CanFrame& frame, TimePoint now);
+  void obey_motion(const drivers::pivot::motion::Request& request, TimePoint now);
+  void obey_motion_plain(drivers::pivot::motion::Command command, TimePoint now);
+  void obey_motion_move(const drivers::pivot::motion::MovePosition& move, TimePoint now);
+  void update_motion(TimePoint now);
+  std::optional<TimePoint> motion_deadline() const;
+  std::uint8_t motion_error(TimePoint now) const;
+  drivers::pivot::motion::Reply motion_value(drivers::pivot::motion::ConfigItem item) const;
+  drivers::pivot::motion::StateReport report(std::uint8_t mode, TimePoint now) const;
+  void say(const drivers::pivot::motion::Reply& reply, TimePoint now);
   void send_due(TimePoint now);
   void corrupt(drivers::link::CanFrame& frame);
 
@@ -93,8 +128,8 @@ class Pivot {
   std::uint32_t latched_ = 0;    ///< Error bits until RESET.
   bool stopped_before_ = false;  ///< Emergency stop as last seen.
   bool bus_off_before_ = false;
-  float ramp_velocity_;
-  float ramp_acceleration_;
+  double ramp_velocity_;
+  double ramp_acceleration_;
   std::optional<TimePoint> reference_end_;
   std::optional<TimePoint> watchdog_until_;
   TimePoint off_until_ = TimePoint::min();
@@ -103,6 +138,18 @@ class Pivot {
   std::optional<std::size_t> bytes_limit_;
   TimePoint loose_until_ = TimePoint::min();
   TimePoint now_{};
+  // Motion Protocol.
+  drivers::pivot::motion::Assembler assembler_;
+  std::optional<drivers::pivot::motion::GetState::Cyclic> cyclic_;
+  TimePoint report_at_{};
+  std::uint8_t mode_ = drivers::pivot::motion::report_mode::kAll;  ///< Of the last request that named one.
+  int states_asked_ = 0;
+  std::uint8_t latched_code_ = 0;  ///< What exactly tripped it.
+  std::uint8_t told_error_ = 0;    ///< The error that was told last.
+  TimePoint error_again_at_{};
+  std::optional<TimePoint> arrives_at_;  ///< End of the move that ends with an impulse.
+  TimePoint heard_at_ = TimePoint::min();
+  bool hurried_ = false;
   std::deque<Due> due_;
   std::vector<drivers::link::CanFrame> out_;
   std::mt19937_64 random_;

@@ -1,18 +1,58 @@
 #pragma once
 
+#include <gtest/gtest.h>
+#include <string>
 #include <vector>
 
 #include "drivers/pivot/codec.hpp"
+#include "drivers/pivot/motion_codec.hpp"
 #include "drivers/pivot/session.hpp"
 #include "tests/emulators/pivot/pivot.hpp"
 
 namespace binpick::drivers::pivot {
-/// A session and an emulated pivot on one bus, in virtual time.
+/// Both protocols: what the session does must not depend on which one the module speaks.
+inline const auto kBothProtocols = testing::Values(Protocol::PowerCube, Protocol::Motion);
+inline std::string protocol_name(Protocol protocol) { return protocol == Protocol::Motion ? "Motion" : "PowerCube"; }
+
+class BothProtocols : public testing::TestWithParam<Protocol> {
+ protected:
+  emulators::PivotOptions fresh() const {
+    emulators::PivotOptions options;
+    options.protocol = GetParam();
+    options.hurry = std::chrono::milliseconds(1);
+    return options;
+  }
+  emulators::PivotOptions referenced() const {
+    emulators::PivotOptions options = fresh();
+    options.referenced = true;
+    options.start = Angle::deg(0);
+    return options;
+  }
+};
+#define BOTH_PROTOCOLS(Suite) \
+  INSTANTIATE_TEST_SUITE_P(Both, Suite, kBothProtocols, [](const auto& row) { return protocol_name(row.param); })
+
+/// A session and an emulated pivot on one bus, in virtual time: they speak what `module_options` says.
 struct Bench {
-  explicit Bench(const emulators::PivotOptions& module_options = {}, const Options& options = {})
-      : module{module_options}, session{options} {
+  explicit Bench(const emulators::PivotOptions& module_options = {}, Options options = {})
+      : protocol{module_options.protocol}, module{module_options}, session{[&] {
+          options.protocol = module_options.protocol;
+          return options;
+        }()} {
     session.on_link_up(now);
     pump();
+  }
+
+  /// Whether the frame tells the module to go somewhere.
+  bool is_setpoint(const CanFrame& frame) const {
+    if (protocol == Protocol::Motion) return frame.length > 1 && frame.payload[1] == 0xB0;
+    return frame.length == 8;
+  }
+  CanFrame setpoint_accepted() const {
+    if (protocol == Protocol::PowerCube) return encode(12, Reply{MoveAccepted{Motion::Step, std::nullopt}});
+    return motion::frames_of(motion::kReplyBase + 12, encode(motion::Reply{motion::Done{motion::Command::MovePosition}},
+                                                             motion::UnitSystem::Degree))
+        .front();
   }
 
   void pump() {
@@ -23,9 +63,8 @@ struct Bench {
           quiet = false;
           sent.push_back(frame);
           if (lost()) continue;
-          const bool step = frame.length == 8;
-          if (step && lose_steps) {
-            session.on_frame(encode(12, Reply{MoveAccepted{Motion::Step, std::nullopt}}), now);
+          if (is_setpoint(frame) && lose_steps) {
+            session.on_frame(setpoint_accepted(), now);
           } else {
             module.on_frame(frame, now);
           }
@@ -49,6 +88,7 @@ struct Bench {
 
   /// Jumps to the earliest deadline of both, never past `end`.
   bool step(TimePoint end) {
+    pump();  // the loop sends before it waits
     auto at = earlier(driver_alive ? session.deadline() : std::nullopt, module.deadline());
     const TimePoint next = std::max(now, std::min(at.value_or(end), end));
     standstill = next == now ? standstill + 1 : 0;
@@ -92,6 +132,7 @@ struct Bench {
   }
 
   TimePoint now{std::chrono::hours(1)};
+  Protocol protocol;
   emulators::Pivot module;
   Session session;
   bool driver_alive = true;

@@ -1,37 +1,19 @@
 #include "drivers/pivot/codec.hpp"
 
 #include <cmath>
-#include <cstdio>
 #include <gtest/gtest.h>
 #include <numbers>
 #include <string>
 #include <vector>
 
 #include "drivers/pivot/state_word.hpp"
+#include "tests/unit/pivot/frame_text.hpp"
 
 /// Byte tables worked out by hand from the public command list (schunk_libm5api, ProtocolCommands.h) for module 12, not
 /// made by our encoder.
 namespace binpick::drivers::pivot {
 namespace {
 constexpr std::uint8_t kId = 12;
-
-/// "0CC [2] 0A 3C"
-CanFrame frame(const std::string& text) {
-  CanFrame f;
-  f.id = static_cast<std::uint32_t>(std::stoul(text.substr(0, 3), nullptr, 16));
-  f.length = static_cast<std::uint8_t>(text[5] - '0');
-  for (std::size_t i = 0; i < f.length; ++i)
-    f.payload[i] = static_cast<std::uint8_t>(std::stoul(text.substr(8 + 3 * i, 2), nullptr, 16));
-  return f;
-}
-
-std::string text_of(const CanFrame& f) {
-  char text[48];
-  int at = std::snprintf(text, sizeof text, "%03X [%d]", f.id, f.length);
-  for (std::size_t i = 0; i < f.length; ++i)
-    at += std::snprintf(text + at, sizeof text - static_cast<std::size_t>(at), " %02X", f.payload[i]);
-  return text;
-}
 
 constexpr float kHalfPi = static_cast<float>(std::numbers::pi / 2);
 
@@ -112,8 +94,8 @@ TEST(PivotCodec, EchoesMayBeLongerThanTheirFirstBytes) {
 }
 
 TEST(PivotCodec, UnsolicitedStateIsTakenAsAHint) {
-  EXPECT_EQ(*decode_reply(kId, frame("06C [0]")), Reply{StateChanged{}});
-  EXPECT_EQ(*decode_reply(kId, frame("06C [4] 11 00 00 00")), Reply{StateChanged{}});
+  EXPECT_EQ(*decode_reply(kId, frame("06C [0]")), Reply{StateNews{}});
+  EXPECT_EQ(*decode_reply(kId, frame("06C [4] 11 00 00 00")), Reply{StateNews{}});
 }
 
 TEST(PivotCodec, FramesOfOthersAreNotOurs) {

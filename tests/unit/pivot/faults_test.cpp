@@ -67,12 +67,12 @@ const std::vector<Fault>& faults() {
        {Why::PowerFault},
        "emergency stop"},
       {"TowError",
-       [](Bench& b) { b.module.faults.error_code = state::kTow; },
+       [](Bench& b) { b.module.faults.error_code = b.protocol == Protocol::Motion ? 0xDA : state::kTow; },
        [](Bench& b) { b.module.faults.error_code.reset(); },
        {Why::ModuleError, Why::ReferenceFailed},
        "following error"},
       {"Overheated",
-       [](Bench& b) { b.module.faults.error_code = state::kStageTemperature; },
+       [](Bench& b) { b.module.faults.error_code = b.protocol == Protocol::Motion ? 0x71 : state::kStageTemperature; },
        [](Bench& b) { b.module.faults.error_code.reset(); },
        {Why::ModuleError, Why::ReferenceFailed},
        "too hot"},
@@ -95,12 +95,13 @@ const std::vector<Fault>& faults() {
   return kFaults;
 }
 
-class PivotFaults : public testing::TestWithParam<std::tuple<std::size_t, State>> {};
+class PivotFaults : public testing::TestWithParam<std::tuple<Protocol, std::size_t, State>> {};
 
 TEST_P(PivotFaults, AreToldAndOvercome) {
-  const auto& [index, phase] = GetParam();
+  const auto& [protocol, index, phase] = GetParam();
   const Fault& fault = faults()[index];
   PivotOptions options;
+  options.protocol = protocol;
   options.start = Angle::deg(60);
   options.referenced = phase == State::Standing || phase == State::Moving;
   Bench bench{options};
@@ -159,22 +160,18 @@ std::string phase_name(State state) {
 }
 
 INSTANTIATE_TEST_SUITE_P(EachInEachState, PivotFaults,
-                         testing::Combine(testing::Range<std::size_t>(0, 13),
+                         testing::Combine(kBothProtocols, testing::Range<std::size_t>(0, 13),
                                           testing::Values(State::Identifying, State::Referencing, State::Standing,
                                                           State::Moving)),
                          [](const auto& row) {
-                           return std::string(faults()[std::get<0>(row.param)].name) +
-                                  phase_name(std::get<1>(row.param));
+                           return protocol_name(std::get<0>(row.param)) + faults()[std::get<1>(row.param)].name +
+                                  phase_name(std::get<2>(row.param));
                          });
 
-PivotOptions referenced() {
-  PivotOptions options;
-  options.referenced = true;
-  options.start = Angle::deg(0);
-  return options;
-}
+class PivotEmergencyStop : public BothProtocols {};
+BOTH_PROTOCOLS(PivotEmergencyStop);
 
-TEST(PivotEmergencyStop, TheAxisStandsAndDoesNotGoOnByItself) {
+TEST_P(PivotEmergencyStop, TheAxisStandsAndDoesNotGoOnByItself) {
   Bench bench{referenced()};
   ASSERT_TRUE(bench.run_until_state(State::Standing, 1s));
   bench.session.move_to(Angle::deg(60), 0.6, bench.now);
@@ -193,7 +190,10 @@ TEST(PivotEmergencyStop, TheAxisStandsAndDoesNotGoOnByItself) {
   EXPECT_EQ(bench.module.reference_runs(), 0U);
 }
 
-TEST(PivotPowerCycle, TheReferenceIsFoundAgain) {
+class PivotPowerCycle : public BothProtocols {};
+BOTH_PROTOCOLS(PivotPowerCycle);
+
+TEST_P(PivotPowerCycle, TheReferenceIsFoundAgain) {
   for (const bool moving : {false, true}) {
     Bench bench{referenced()};
     ASSERT_TRUE(bench.run_until_state(State::Standing, 1s));
@@ -207,7 +207,7 @@ TEST(PivotPowerCycle, TheReferenceIsFoundAgain) {
   }
 }
 
-TEST(PivotPowerCycle, SoShortThatNoReplyIsMissingIsNoticedToo) {
+TEST_P(PivotPowerCycle, SoShortThatNoReplyIsMissingIsNoticedToo) {
   PivotOptions options = referenced();
   options.boot = 0ms;
   options.start = Angle::deg(20);
@@ -220,8 +220,11 @@ TEST(PivotPowerCycle, SoShortThatNoReplyIsMissingIsNoticedToo) {
   EXPECT_TRUE(bench.run_until([&] { return bench.count<Ready>() == 2; }, 5s));
 }
 
-TEST(PivotReference, ABrokenHomeSwitchIsToldAndNotTriedWithoutPause) {
-  PivotOptions options;
+class PivotReference : public BothProtocols {};
+BOTH_PROTOCOLS(PivotReference);
+
+TEST_P(PivotReference, ABrokenHomeSwitchIsToldAndNotTriedWithoutPause) {
+  PivotOptions options = fresh();
   Bench bench{options};
   bench.module.home_switch_broken = true;
   bench.run_for(60s);
@@ -233,8 +236,8 @@ TEST(PivotReference, ABrokenHomeSwitchIsToldAndNotTriedWithoutPause) {
   EXPECT_TRUE(bench.run_until_state(State::Standing, 40s));
 }
 
-TEST(PivotReference, ThatNeverEndsIsGivenUp) {
-  PivotOptions options;
+TEST_P(PivotReference, ThatNeverEndsIsGivenUp) {
+  PivotOptions options = fresh();
   options.start = Angle::deg(150);
   options.home_velocity_rad_s = 0.01;
   Options session;
@@ -246,21 +249,32 @@ TEST(PivotReference, ThatNeverEndsIsGivenUp) {
   EXPECT_FALSE(bench.module.moving(bench.now));
 }
 
-TEST(PivotReference, AMotionThatAnEarlierProgramLeftIsStoppedFirst) {
+TEST_P(PivotReference, AMotionThatAnEarlierProgramLeftIsStoppedFirst) {
   PivotOptions options = referenced();
   Bench first{options};
   ASSERT_TRUE(first.run_until_state(State::Standing, 1s));
-  // A velocity that another program asked for goes on for ever.
-  first.module.on_frame(encode(12, Request{Move{Motion::Velocity, 0.3F, 0}}), first.now);
+  if (GetParam() == Protocol::PowerCube) {  // a velocity that another program asked for goes on for ever
+    first.module.on_frame(encode(12, Request{Move{Motion::Velocity, 0.3F, 0}}), first.now);
+  } else {
+    for (const CanFrame& frame : motion::frames_of(
+             0x50C, encode(motion::Request{motion::MovePosition{2.5, 0.3, 1.0}}, motion::UnitSystem::Degree)))
+      first.module.on_frame(frame, first.now += 2ms);
+  }
   first.session.on_link_down("restart", first.now);
-  first.session = Session{Options{}};
+  first.now += 5ms;
+  Options again;
+  again.protocol = GetParam();
+  first.session = Session{again};
   first.session.on_link_up(first.now);
   first.pump();
   ASSERT_TRUE(first.run_until_state(State::Standing, 3s));
   EXPECT_FALSE(first.module.moving(first.now));
 }
 
-TEST(PivotMove, RefusedIsTold) {
+class PivotMove : public BothProtocols {};
+BOTH_PROTOCOLS(PivotMove);
+
+TEST_P(PivotMove, RefusedIsTold) {
   PivotOptions options = referenced();
   Bench bench{options};
   ASSERT_TRUE(bench.run_until_state(State::Standing, 1s));
@@ -273,8 +287,11 @@ TEST(PivotMove, RefusedIsTold) {
   EXPECT_TRUE(bench.run_until_state(State::Standing, 3s));
 }
 
-TEST(PivotBus, ErrorPassiveIsToldApartFromSilence) {
-  PivotOptions options;
+class PivotBus : public BothProtocols {};
+BOTH_PROTOCOLS(PivotBus);
+
+TEST_P(PivotBus, ErrorPassiveIsToldApartFromSilence) {
+  PivotOptions options = fresh();
   Bench bench{options};
   bench.module.faults.unplugged = true;
   CanFrame passive;  // controller problem, TX passive, counters 128 and 0: nobody acknowledges
@@ -291,7 +308,7 @@ TEST(PivotBus, ErrorPassiveIsToldApartFromSilence) {
   EXPECT_TRUE(bench.run_until_state(State::Standing, 5s));
 }
 
-TEST(PivotBus, BusOffByTheLinkIsBusOff) {
+TEST_P(PivotBus, BusOffByTheLinkIsBusOff) {
   Bench bench{referenced()};
   ASSERT_TRUE(bench.run_until_state(State::Standing, 1s));
   bench.session.on_link_down("bus-off on can0: short circuit, …", bench.now);
@@ -305,8 +322,11 @@ TEST(PivotBus, BusOffByTheLinkIsBusOff) {
   EXPECT_TRUE(bench.run_until_state(State::Standing, 1s));
 }
 
+class PivotFaultsAtRandom : public BothProtocols {};
+BOTH_PROTOCOLS(PivotFaultsAtRandom);
+
 /// Faults that come and go at random for an hour: at the end the pivot is ready and does what it is told.
-TEST(PivotFaultsAtRandom, AlwaysEndReady) {
+TEST_P(PivotFaultsAtRandom, AlwaysEndReady) {
   for (unsigned seed = 1; seed <= 20; ++seed) {
     std::mt19937 random{seed};
     Bench bench{referenced()};
