@@ -102,7 +102,7 @@ const std::vector<Section<Config>>& cell_sections() {
             [](C& c) -> Slot { return &c.plc.detect_timeout; }},
        }},
       {"pivot",
-       "The Schunk PR 70 (PowerCube) that turns the scanner.",
+       "The Schunk PR 70 that turns the scanner.",
        {
            {{.name = "can", .type = CanBus, .only_for = kOnPivot, .in_example = true,
              .required = true, .example = "\"can0\"", .change = kRestart,
@@ -112,9 +112,18 @@ const std::vector<Section<Config>>& cell_sections() {
              .default_value = "0", .change = kRestart,
              .help = "Own UDP port for cannelloni; 0: any."},
             [](C& c) -> Slot { return &c.pivot_can_listen_port; }},
-           {{.name = "module_id", .type = Integer, .min = 1, .max = 31, .only_for = kOnPivot, .in_example = true,
+           {{.name = "protocol", .type = Choice, .only_for = kOnPivot, .in_example = true,
+             .default_value = "\"powercube\"", .change = kRestart,
+             .choices = {"powercube", "motion"},
+             .help = "What the module speaks: powercube (older electronics) or motion (Schunk Motion Protocol, newer "
+                     "ones). `binpick probe` tells which it answers."},
+            [](C& c) -> Slot {
+              using enum drivers::pivot::Protocol;
+              return chosen(c.pivot.protocol, {PowerCube, Motion});
+            }},
+           {{.name = "module_id", .type = Integer, .min = 1, .max = 255, .only_for = kOnPivot, .in_example = true,
              .default_value = "12", .change = kRestart,
-             .help = "The module's number on the bus."},
+             .help = "The module's number on the bus; PowerCube modules have 1 to 31."},
             [](C& c) -> Slot { return &c.pivot.module_id; }},
            {{.name = "reply_timeout_ms", .type = Integer, .unit = "ms", .min = 10, .max = 5000,
              .only_for = kOnPivot, .in_example = true,
@@ -130,7 +139,7 @@ const std::vector<Section<Config>>& cell_sections() {
              .only_for = kOnPivot, .in_example = true,
              .default_value = "200", .change = kRestart,
              .help = "While moving, the module knows no target further ahead than this: so long it moves on when "
-                     "the daemon vanishes."},
+                     "the daemon vanishes (with protocol = motion at least as long as it needs to brake)."},
             [](C& c) -> Slot { return &c.pivot.setpoint_horizon; }},
            {{.name = "reference_timeout_s", .type = Integer, .unit = "s", .min = 1, .max = 300,
              .only_for = kOnPivot, .in_example = true,

@@ -10,6 +10,7 @@
 namespace binpick::config {
 namespace {
 constexpr double kFieldOfViewEndDeg = 125;  // LMS 400: 55 … 125, 90 straight ahead
+constexpr unsigned kPowerCubeIdMax = 31;
 constexpr double kSweepMinDeg = 1;
 constexpr double kProfilesMin = 20;
 
@@ -62,6 +63,10 @@ void check_devices(const Config& c, const CellPlaces& at, Findings& findings) {
     findings.add(at.of("scanner", "manual_exposure_us"),
                  "scanner.manual_exposure_us = " + std::to_string(*c.manual_exposure_us) +
                      " is less than an LPS 36 can; use 98 … 1310");
+  if (c.pivot.protocol == drivers::pivot::Protocol::PowerCube && c.pivot.module_id > kPowerCubeIdMax)
+    findings.add(at.of("pivot", "module_id"),
+                 "pivot.module_id = " + std::to_string(c.pivot.module_id) +
+                     " is above 31, the last number of a PowerCube module; correct it, or set protocol = \"motion\"");
   if (c.pivot_can_listen_port != 0 && at.given("pivot", "can") && !c.pivot_can.starts_with("cannelloni://"))
     findings.add(at.of("pivot", "can_listen_port"),
                  "pivot.can_listen_port is for cannelloni, but pivot.can is a network interface; remove it");

@@ -209,6 +209,7 @@ the fixed axes x, then y, then z, in degrees. `T_a_b` maps coordinates in b to c
 
 - `scanner.start_deg` + `scanner.range_deg` is at most 125, the end of the scanner's field of view.
 - `pivot.setpoint_horizon_ms` is at least twice `pivot.sample_period_ms`.
+- `pivot.module_id` is at most 31 where `pivot.protocol` is powercube.
 - `pivot.can_listen_port` is for cannelloni only.
 - `detection.deadline_ms` is shorter than `plc.detect_timeout_ms`.
 - `plc.heartbeat_timeout_ms` is 0 or at least 100.

@@ -39,9 +39,8 @@ link::StreamPeer plc_server_of(Cell& cell) {
 
 std::unique_ptr<link::CanLink> open_pivot(link::Loop& loop, Cell& cell) {
   const auto& config = cell.data().config;
-  const std::uint32_t module = config.pivot.module_id;
   return link::open_can(
-      loop, config.pivot_can, {{0x0A0 + module, 0x7FF}, {0x060 + module, 0x7FF}},
+      loop, config.pivot_can, cell.pivot().filters(),
       {
           .on_up = [&cell](TimePoint now) { cell.pivot().on_link_up(now); },
           .on_frame = [&cell](const link::CanFrame& frame, TimePoint at) { cell.pivot().on_frame(frame, at); },

@@ -43,7 +43,7 @@ bool daemon_runs(const config::Config& config) {
 std::unique_ptr<link::CanLink> DeviceLinks::open_pivot(const config::Config& config) {
   if (config.carrier != config::Carrier::Pivot) return nullptr;
   return link::open_can(
-      loop_, config.pivot_can, {{0x0A0U + config.pivot.module_id, 0x7FF}, {0x060U + config.pivot.module_id, 0x7FF}},
+      loop_, config.pivot_can, pivot_.filters(),
       {
           .on_up = [this](TimePoint now) { pivot_.on_link_up(now); },
           .on_frame = [this](const link::CanFrame& frame, TimePoint at) { pivot_.on_frame(frame, at); },

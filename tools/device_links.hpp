@@ -10,7 +10,7 @@
 #include "drivers/link/device_link.hpp"
 #include "drivers/link/loop.hpp"
 #include "drivers/link/tcp.hpp"
-#include "drivers/pivot/session.hpp"
+#include "drivers/pivot/probe.hpp"
 #include "drivers/scanner/any/scanner.hpp"
 
 namespace binpick::tools {
@@ -25,7 +25,9 @@ class DeviceLinks {
   /// `may_move`: false keeps the pivot from its reference run.
   DeviceLinks(const config::Config& config, bool may_move);
 
-  drivers::pivot::Session& pivot() { return pivot_; }
+  drivers::pivot::Session& pivot() { return pivot_.session(); }
+  /// Without `may_move`: the module is there and speaks this protocol, and not the one that the cell file says.
+  std::optional<drivers::pivot::Protocol> pivot_answers_in_other() const { return pivot_.answers_in_other(); }
   drivers::scanner::Scanner& scanner() { return scanner_; }
   drivers::link::Loop& loop() { return loop_; }
 
@@ -37,7 +39,7 @@ class DeviceLinks {
   std::unique_ptr<drivers::link::CanLink> open_pivot(const config::Config& config);
 
   drivers::link::Loop loop_;
-  drivers::pivot::Session pivot_;
+  drivers::pivot::Probe pivot_;
   drivers::scanner::Scanner scanner_;
   std::unique_ptr<drivers::link::CanLink> pivot_link_;  // null: the robot carries the scanner
   std::unique_ptr<drivers::link::DeviceLink> scanner_link_;

@@ -8,7 +8,6 @@
 #include "base/clock.hpp"
 #include "base/overloaded.hpp"
 #include "config/config.hpp"
-#include "drivers/pivot/state_word.hpp"
 #include "tools/commands.hpp"
 #include "tools/device_links.hpp"
 #include "tools/plc_probe.hpp"
@@ -44,6 +43,23 @@ std::optional<std::string> robot_address(drivers::link::Loop& loop, const std::s
   return robot;
 }
 
+std::string pivot_text(const drivers::pivot::Options& options, const drivers::pivot::ModuleInfo& module) {
+  char text[240];
+  std::snprintf(text, sizeof text,
+                "%s module %u%s%s, firmware %04x, serial %u, range %.1f … %.1f deg, at most %.1f deg/s and %.0f deg/s²",
+                to_string(options.protocol), unsigned{options.module_id}, module.type.empty() ? "" : ", ",
+                module.type.c_str(), unsigned{module.firmware}, module.serial, module.position_min.in_deg(),
+                module.position_max.in_deg(), Angle::rad(module.velocity_max_rad_s).in_deg(),
+                Angle::rad(module.acceleration_max_rad_s2).in_deg());
+  return text;
+}
+
+std::string other_protocol_text(drivers::pivot::Protocol protocol, const std::string& cell_path) {
+  const bool motion = protocol == drivers::pivot::Protocol::Motion;
+  return std::string("the module speaks ") + (motion ? "the " : "") + to_string(protocol) + "; write protocol = \"" +
+         (motion ? "motion" : "powercube") + "\" under [pivot] in " + cell_path;
+}
+
 int probe(const std::string& cell_path) {
   const auto config = config::load(cell_path);
   if (!config) {
@@ -60,30 +76,26 @@ int probe(const std::string& cell_path) {
 
   std::string pivot = "no answer", scanner;
   const bool has_pivot = config->carrier == config::Carrier::Pivot;
-  bool pivot_good = !has_pivot, scanner_good = false;
+  bool pivot_good = !has_pivot, pivot_known = false, scanner_good = false;
   const SystemClock clock;
   TimePoint now = clock.now();
   const TimePoint began = now;
   const auto patience = [&] {
     return began + (devices.scanner().state() == drivers::scanner::State::Starting ? kSpinUpMax : kAnswerMax);
   };
-  while ((!pivot_good || !scanner_good) && now < patience()) {
+  while ((!(pivot_good || pivot_known) || !scanner_good) && now < patience()) {
     now = devices.turn(now, std::min(patience(), now + std::chrono::milliseconds(200)));
     while (auto event = devices.pivot().take_event()) {
       if (const auto* ready = std::get_if<drivers::pivot::Ready>(&*event)) {
-        char text[200];
-        std::snprintf(
-            text, sizeof text,
-            "PowerCube module %u, firmware %04x, serial %u, range %.1f … %.1f deg, at most %.1f deg/s and %.0f "
-            "deg/s²",
-            config->pivot.module_id, ready->module.firmware, ready->module.serial, ready->module.position_min.in_deg(),
-            ready->module.position_max.in_deg(), Angle::rad(ready->module.velocity_max_rad_s).in_deg(),
-            Angle::rad(ready->module.acceleration_max_rad_s2).in_deg());
-        pivot = std::string(text) + "; " + drivers::pivot::state_in_words(devices.pivot().state_word());
+        pivot = pivot_text(config->pivot, ready->module) + "; " + devices.pivot().state_in_words();
         pivot_good = true;
       } else if (const auto* failed = std::get_if<drivers::pivot::Failed>(&*event)) {
-        if (!pivot_good) pivot = failed->text;
+        if (!pivot_good && !pivot_known) pivot = failed->text;
       }
+    }
+    if (const auto protocol = devices.pivot_answers_in_other(); protocol && !pivot_good) {
+      pivot = other_protocol_text(*protocol, cell_path);
+      pivot_known = true;
     }
     while (auto event = devices.scanner().take_event()) {
       if (const auto* ready = std::get_if<drivers::scanner::Ready>(&*event)) {

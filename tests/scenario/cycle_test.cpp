@@ -12,11 +12,12 @@ namespace binpick::support {
 namespace {
 using namespace std::chrono_literals;
 
-/// A make of robot and of PLC.
+/// A make of robot and of PLC, and what the pivot speaks.
 struct Makes {
   const char* word_order;
   const char* robot;
   const char* plc_role = "server";  ///< What the daemon is.
+  const char* pivot = "powercube";
 };
 
 CellFile with(const Makes& makes) {
@@ -24,6 +25,7 @@ CellFile with(const Makes& makes) {
   file.word_order = makes.word_order;
   file.robot = makes.robot;
   file.plc_role = makes.plc_role;
+  file.pivot = makes.pivot;
   return file;
 }
 
@@ -85,10 +87,10 @@ TEST_P(WholePick, FromThePlcsRequestToTheRobotsReport) {
 INSTANTIATE_TEST_SUITE_P(EachMake, WholePick,
                          testing::Values(Makes{"s7", "ur"}, Makes{"logix", "ur"}, Makes{"s7", "fanuc"},
                                          Makes{"logix", "kawasaki"}, Makes{"s7", "ur", "client"},
-                                         Makes{"logix", "fanuc", "client"}),
+                                         Makes{"logix", "fanuc", "client"}, Makes{"s7", "ur", "server", "motion"}),
                          [](const auto& each) {
                            return std::string(each.param.word_order) + "_" + each.param.robot + "_" +
-                                  each.param.plc_role;
+                                  each.param.plc_role + "_" + each.param.pivot;
                          });
 
 TEST(Cycle, AScannerThatFallsSilentJustBeforeTheEndIsAFaultNotAnEmptySupply) {

@@ -52,8 +52,9 @@ std::string to_toml(const CellFile& file) {
       << file.robot << "\"\nallow = []\ndetect_timeout_ms = " << file.detect_timeout_ms << "\n\n";
   if (file.scan_path == 0)
     out << "[pivot]\ncan = \"cannelloni://127.0.0.1:" << file.can_port
-        << "\"\ncan_listen_port = " << file.can_listen_port << "\nmodule_id = 12\nT_base_pivot = { xyz_mm = [1200, 0, "
-        << layout.pivot_height_mm << "], rpy_deg = [0, 90, 0] }\n\n";
+        << "\"\ncan_listen_port = " << file.can_listen_port << "\nprotocol = \"" << file.pivot
+        << "\"\nmodule_id = 12\nT_base_pivot = { xyz_mm = [1200, 0, " << layout.pivot_height_mm
+        << "], rpy_deg = [0, 90, 0] }\n\n";
   write_scanner(out, file);
   out << "\n[robot]\ndialect = \"" << file.robot << "\"\nsilence_max_s = 5\nlisten = \""
       << (file.robot_port == 0 ? "" : "127.0.0.1:" + std::to_string(file.robot_port)) << "\"\nallow = []\n";

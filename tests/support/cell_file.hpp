@@ -14,6 +14,7 @@ struct CellFile {
   std::uint16_t scan_path = 0;     ///< Other than 0: the robot carries the scanner, along this path (scan_paths.hpp).
   std::string word_order = "s7";
   std::string plc_role = "server";                  ///< plc.role: what the daemon is.
+  std::string pivot = "powercube";                  ///< pivot.protocol.
   std::string robot = "ur";                         ///< robot.dialect and plc.pose_convention.
   std::vector<std::string> parts = {"track_link"};  ///< Example parts that the build has trained; ids 1, 2, ….
   bool own_copies = false;                          ///< Each recipe gets a knowledge base file of its own.

@@ -16,6 +16,7 @@ emulators::PlcOptions plc_options(const config::Config& config) {
 
 emulators::PivotOptions pivot_options(const config::Config& config, std::uint64_t seed) {
   emulators::PivotOptions options;
+  options.protocol = config.pivot.protocol;
   options.module_id = config.pivot.module_id;
   options.seed = seed;
   return options;

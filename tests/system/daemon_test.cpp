@@ -20,14 +20,19 @@ bool reach_sweep(SystemCell& cell) {
 }
 }  // namespace
 
-TEST(Daemon, MakesAWholePick) {
-  SystemCell cell{coarse_cell(), scene_of("track_link", 3, 2)};
+class DaemonAndPivot : public testing::TestWithParam<const char*> {};  // pivot.protocol
+
+TEST_P(DaemonAndPivot, MakeAWholePick) {
+  CellFile file = coarse_cell();
+  file.pivot = GetParam();
+  SystemCell cell{file, scene_of("track_link", 3, 2)};
   ASSERT_TRUE(cell.run_until_ready());
   const auto result = cell.pick();
   ASSERT_TRUE(result.has_value());
   EXPECT_EQ(result->code, plc::ResultCode::PickFound);
   ASSERT_TRUE(cell.run_until([&] { return cell.robot().picks_done() == 1; }));
 }
+INSTANTIATE_TEST_SUITE_P(Both, DaemonAndPivot, testing::Values("powercube", "motion"));
 
 TEST(Daemon, PollsAPlcThatIsTheServerAndTellsItWhenItEnds) {
   CellFile file = coarse_cell();

@@ -17,8 +17,6 @@
 extern char** environ;
 
 namespace binpick::support {
-namespace {
-/// A port that was free a moment ago.
 std::uint16_t free_port(int type) {
   static std::set<std::uint16_t> given;
   for (int attempt = 0; attempt < 100; ++attempt) {
@@ -35,7 +33,10 @@ std::uint16_t free_port(int type) {
   throw std::runtime_error("no free port");
 }
 
-pid_t start(const std::string& program, const std::vector<std::string>& arguments, const std::string& log_path) {
+namespace {
+/// `output_path` empty: its standard output is ours.
+pid_t start(const std::string& program, const std::vector<std::string>& arguments, const std::string& log_path,
+            const std::string& output_path = {}) {
   std::vector<std::string> words{program};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
@@ -43,7 +44,10 @@ pid_t start(const std::string& program, const std::vector<std::string>& argument
   argv.push_back(nullptr);
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, log_path.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0600);
+  constexpr int kAppend = O_WRONLY | O_CREAT | O_APPEND;
+  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, log_path.c_str(), kAppend, 0600);
+  if (!output_path.empty())
+    posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, output_path.c_str(), kAppend, 0600);
   pid_t child = -1;
   const int failed = posix_spawn(&child, program.c_str(), &actions, nullptr, argv.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
@@ -77,6 +81,7 @@ SystemCell::SystemCell(CellFile file, emulators::World scene) : file_{std::move(
   config_ = std::move(*config);
 
   emulators::PivotOptions pivot;
+  pivot.protocol = config_->pivot.protocol;
   pivot.referenced = true;
   pivot_ = std::make_unique<emulators::PivotPort>(config_->pivot_can, pivot);
   const emulators::ScannerPlace place{config_->mount.T_base_pivot, config_->mount.T_pivot_scanner,
@@ -158,10 +163,12 @@ bool SystemCell::pivot_moves() {
 
 Ended run_program(const std::string& program, const std::vector<std::string>& arguments) {
   const std::string log_path = test_folder().path() + "/program.err";
+  const std::string output_path = test_folder().path() + "/program.out";
   std::remove(log_path.c_str());
-  const pid_t child = start(program, arguments, log_path);
+  std::remove(output_path.c_str());
+  const pid_t child = start(program, arguments, log_path, output_path);
   int status = 0;
   waitpid(child, &status, 0);
-  return {status_of(status), text_of(log_path)};
+  return {status_of(status), text_of(log_path), text_of(output_path)};
 }
 }  // namespace binpick::support

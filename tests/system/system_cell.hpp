@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <sys/socket.h>
 #include <sys/types.h>
 
 #include "base/clock.hpp"
@@ -14,6 +15,9 @@
 #include "tests/support/cell_file.hpp"
 
 namespace binpick::support {
+/// A port of this machine that was free a moment ago; SOCK_STREAM or SOCK_DGRAM.
+std::uint16_t free_port(int type);
+
 /// The real binpickd as a process, and the emulated devices on real sockets of this machine, in real time.
 class SystemCell {
  public:
@@ -56,10 +60,10 @@ class SystemCell {
   std::optional<int> exit_status_;
 };
 
-/// Runs a program to its end: exit status and all that it wrote to stderr.
+/// Runs a program to its end: exit status and all that it wrote to stderr and stdout.
 struct Ended {
   int status = -1;
-  std::string errors;
+  std::string errors, output;
 };
 Ended run_program(const std::string& program, const std::vector<std::string>& arguments);
 }  // namespace binpick::support

@@ -18,7 +18,7 @@ constexpr int kExitUsage = 2;
 
 struct Arguments {
   std::string config;
-  std::string part, supply;
+  std::string part, supply, pivot;
   std::string parts_folder;
   std::vector<std::string> without;
   double pick_time_s = 8, pause_s = 0, timeout_s = 0;
@@ -70,6 +70,8 @@ int play(Arguments arguments) {
   run.bin.supply = *supply;
   run.pick_time = from_s(arguments.pick_time_s);
   run.pause = from_s(arguments.pause_s);
+  using drivers::pivot::Protocol;
+  if (!arguments.pivot.empty()) run.pivot = arguments.pivot == "motion" ? Protocol::Motion : Protocol::PowerCube;
   if (arguments.serve) run.cycles = 0;
   if (arguments.timeout_s > 0)
     run.timeout = from_s(arguments.timeout_s);
@@ -116,6 +118,8 @@ int main(int argc, char** argv) {
   app.add_option("--without", arguments.without, "of cell: a device that is real, or played elsewhere")
       ->check(CLI::IsMember({"plc", "pivot", "scanner", "robot"}));
   app.add_option("--daemon", run.daemon_host, "host of binpickd; default: as the cell file says, or this machine");
+  app.add_option("--pivot", arguments.pivot, "protocol that the pivot speaks; default: the cell file's pivot.protocol")
+      ->check(CLI::IsMember({"powercube", "motion"}));
   app.add_option("--pick-time", arguments.pick_time_s, "s that the emulated PLC gives a robot that is not played here")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();

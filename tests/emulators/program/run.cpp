@@ -63,6 +63,7 @@ void Run::open_devices() {
   const config::Supply& supply = config_.supplies.at(options_.bin.supply);
   if (options_.devices.contains(Device::Pivot)) {
     PivotOptions pivot;
+    pivot.protocol = options_.pivot.value_or(config_.pivot.protocol);
     pivot.module_id = config_.pivot.module_id;
     pivot.seed = options_.bin.seed;
     pivot_ = std::make_unique<PivotPort>(config_.pivot_can, pivot);
@@ -104,7 +105,9 @@ void Run::say_bin(const char* what) const {
 }
 
 void Run::print_addresses() const {
-  if (pivot_) say("pivot:   %s, module %u", config_.pivot_can.c_str(), config_.pivot.module_id);
+  if (pivot_)
+    say("pivot:   %s, module %u, %s", config_.pivot_can.c_str(), unsigned{config_.pivot.module_id},
+        to_string(options_.pivot.value_or(config_.pivot.protocol)));
   if (scanner_) say("scanner: listens at %s", config_.scanner_address.c_str());
   if (robot_) say("robot:   connects to the daemon's robot.listen, %s", config_.robot_listen.c_str());
   if (plc_)

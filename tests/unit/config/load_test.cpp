@@ -319,6 +319,10 @@ INSTANTIATE_TEST_SUITE_P(
                 "pivot.sample_period_ms = 100.5 is not a whole number; write it as sample_period_ms = 10"},
         Mistake{"setpoint_horizon_ms = 200", "setpoint_horizon_ms = 19", "setpoint_horizon_ms", 23,
                 "pivot.setpoint_horizon_ms = 19 is outside 20 … 2000; use at least 20"},
+        Mistake{
+            "module_id = 12", "module_id = 32", "module_id", 13,
+            "pivot.module_id = 32 is above 31, the last number of a PowerCube module; correct it, or set protocol = "
+            "\"motion\""},
         Mistake{"can_listen_port = 0", "can_listen_port = 20000", "can_listen_port", 19,
                 "pivot.can_listen_port is for cannelloni, but pivot.can is a network interface; remove it"},
         Mistake{"detect_timeout_ms = 5000", "detect_timeout_ms = 3000", "deadline_ms", 15,
