@@ -74,7 +74,7 @@ void RobotCarrier::stop(TimePoint) {
 std::string RobotCarrier::overdue() const {
   const std::string why = poses_.trouble();
   return "the robot did not come to the end of its scan path in time" + (why.empty() ? "" : " (" + why + ")") +
-         "; look for a stop on its panel, or allow the path more time with scan_timeout_s";
+         "; look for a stop on its panel, or allow the path more time with path_timeout_ms of the supply";
 }
 
 std::optional<CarrierPose> RobotCarrier::at(TimePoint at) const {
