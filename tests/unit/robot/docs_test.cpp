@@ -28,9 +28,9 @@ std::string read_page(const std::string& make = "universal-robots") {
 // The pages are what integrators program from: their numbers are those of the code.
 TEST(RobotDocs, EveryStatusStandsInTheTableOfEachMake) {
   std::set<int> known;
-  for (const Status status :
-       {Status::NotReady, Status::Pick, Status::ReportTaken, Status::Hello, Status::SupplyEmpty, Status::NothingFound,
-        Status::NotReachable, Status::Fault, Status::UnknownPick, Status::BadRequest})
+  for (const Status status : {Status::NotReady, Status::Pick, Status::ReportTaken, Status::Hello, Status::SupplyEmpty,
+                              Status::NothingFound, Status::NotReachable, Status::Fault, Status::UnknownPick,
+                              Status::BadRequest, Status::Scan, Status::Go, Status::UnknownScan})
     known.insert(static_cast<int>(status));
   for (const char* make : kPages) {
     SCOPED_TRACE(make);
@@ -56,17 +56,6 @@ TEST(RobotDocs, TheProgramReadsAsManyNumbersAsAreSent) {
   const std::string entries = page.substr(list, page.find(']', list) - list);
   EXPECT_EQ(static_cast<std::size_t>(std::count(entries.begin(), entries.end(), ',')), kReplyFields)
       << "count and fields";
-}
-
-TEST(RobotDocs, EveryRequestOfTheProgramIsUnderstood) {
-  const std::string page = read_page();
-  const std::regex call{"ask\\((?:str_cat\\()?\"([a-z]+) ?\""};
-  int calls = 0;
-  for (std::sregex_iterator it{page.begin(), page.end(), call}, end; it != end; ++it, ++calls) {
-    const std::string word = (*it)[1];
-    EXPECT_TRUE(decode_request(word == "done" || word == "failed" ? word + " 17" : word)) << word;
-  }
-  EXPECT_EQ(calls, 4);
 }
 
 namespace {
@@ -103,9 +92,34 @@ void expect_requests(const std::string& page, const std::string& pattern, const 
   for (std::sregex_iterator it{page.begin(), page.end(), regex}, end; it != end; ++it) {
     words.insert((*it)[1]);
     const std::string word = (*it)[1];
-    EXPECT_TRUE(decode_request(word == "done" || word == "failed" ? word + "    17" : word)) << word;
+    EXPECT_TRUE(decode_request(word == "hello" || word == "fetch" ? word : word + "    17")) << word;
   }
   EXPECT_EQ(words, expected);
+}
+
+const std::set<std::string> kRequests{"hello", "fetch", "done", "failed", "begin", "end", "broken"};
+
+/// How often `pattern` stands in `text`.
+long count(const std::string& text, const char* pattern) {
+  const std::regex regex{pattern};
+  return std::distance(std::sregex_iterator{text.begin(), text.end(), regex}, std::sregex_iterator{});
+}
+
+/// From `begin` to `end`, which both must be there, in this order.
+std::string part_of(const std::string& page, const std::string& begin, const std::string& end) {
+  const std::size_t from = page.find(begin), to = from == std::string::npos ? from : page.find(end, from);
+  EXPECT_NE(to, std::string::npos) << begin << " … " << end;
+  return to == std::string::npos ? "" : page.substr(from, to - from);
+}
+
+/// Each of `steps` stands in `code`, one after the other.
+void expect_in_order(const std::string& code, const std::vector<std::string>& steps) {
+  std::size_t at = 0;
+  for (const std::string& step : steps) {
+    const std::size_t found = code.find(step, at);
+    ASSERT_NE(found, std::string::npos) << "not there, or not after the step before: " << step;
+    at = found + step.size();
+  }
 }
 }  // namespace
 
@@ -142,7 +156,7 @@ TEST(RobotDocs, TheKarelProgramCutsTheColumnsThatAreSent) {
   EXPECT_EQ(reals, (std::vector<int>(third.begin(), third.begin() + 6)));
   EXPECT_EQ(numbers(page, "CNV_STR_INT\\(SUB_STR\\(line\\[row\\], column, ([0-9]+)\\)"), std::vector<int>{5});
   EXPECT_EQ(numbers(page, "CNV_STR_REAL\\(SUB_STR\\(line\\[row\\], column, ([0-9]+)\\)"), std::vector<int>{10});
-  expect_requests(page, "ask\\('([a-z]+) ?'", {"hello", "fetch", "done", "failed"});
+  expect_requests(page, "ask\\('([a-z]+) ?'", kRequests);
 }
 
 TEST(RobotDocs, TheKarelProgramsNamesAreShortAndTheirBlocksClosed) {
@@ -155,14 +169,10 @@ TEST(RobotDocs, TheKarelProgramsNamesAreShortAndTheirBlocksClosed) {
     const std::regex name{"\\b[a-z][a-z_0-9]*\\b"};
     for (std::sregex_iterator it{code.begin(), code.end(), name}, last; it != last; ++it)
       EXPECT_LE(it->str().size(), 12U) << it->str();
-    const auto count = [&](const char* pattern) {
-      const std::regex regex{pattern};
-      return std::distance(std::sregex_iterator{code.begin(), code.end(), regex}, std::sregex_iterator{});
-    };
-    EXPECT_EQ(count("\\bTHEN\\b"), count("\\bENDIF\\b"));
-    EXPECT_EQ(count("\\bWHILE\\b"), count("\\bENDWHILE\\b"));
-    EXPECT_EQ(count("\\bFOR\\b"), count("\\bENDFOR\\b"));
-    EXPECT_EQ(count("\\bROUTINE\\b"), count("\\bEND [a-z_]+"));
+    EXPECT_EQ(count(code, "\\bTHEN\\b"), count(code, "\\bENDIF\\b"));
+    EXPECT_EQ(count(code, "\\bWHILE\\b"), count(code, "\\bENDWHILE\\b"));
+    EXPECT_EQ(count(code, "\\bFOR\\b"), count(code, "\\bENDFOR\\b"));
+    EXPECT_EQ(count(code, "\\bROUTINE\\b"), count(code, "\\bEND [a-z_]+"));
   }
 }
 
@@ -177,6 +187,9 @@ TEST(RobotDocs, TheTpProgramJumpsToLabelsThatAreThereAndIsNumberedThrough) {
   EXPECT_EQ(std::set<int>(labels.begin(), labels.end()).size(), labels.size()) << "each label once";
   const auto lines = numbers(program, "\n *([0-9]+):  ");
   for (std::size_t i = 0; i < lines.size(); ++i) EXPECT_EQ(lines[i], static_cast<int>(i) + 1);
+  const std::regex call{"CALL ([A-Z]+)"};
+  for (std::sregex_iterator it{program.begin(), program.end(), call}, last; it != last; ++it)
+    EXPECT_NE(page.find("/PROG  " + (*it)[1].str() + "\n"), std::string::npos) << (*it)[1];
 }
 
 TEST(RobotDocs, TheAsProgramTakesAsManyNumbersAsAreSent) {
@@ -188,13 +201,13 @@ TEST(RobotDocs, TheAsProgramTakesAsManyNumbersAsAreSent) {
   const std::set<int> used(fields.begin(), fields.end());
   for (int field = 7; field <= 18; ++field) EXPECT_TRUE(used.contains(field)) << field;
   EXPECT_LE(*used.rbegin(), static_cast<int>(kReplyFields));
-  expect_requests(page, "\\.\\$line = \"([a-z]+) ?\"", {"hello", "fetch", "done", "failed"});
+  expect_requests(page, "\\.\\$line = \"([a-z]+) ?\"", kRequests);
 }
 
 TEST(RobotDocs, TheAsProgramsOpenAndCloseTheirBlocksAndCallWhatIsThere) {
   const std::string page = read_page("kawasaki");
   std::size_t begin = 0;
-  for (const std::size_t expected : {10U, 3U}) {
+  for (const std::size_t expected : {14U, 3U}) {
     begin = page.find("\n.PROGRAM ", begin);
     const std::size_t end = page.find("\n.REALS", begin);
     ASSERT_TRUE(begin != std::string::npos && end != std::string::npos);
@@ -215,6 +228,95 @@ TEST(RobotDocs, TheAsProgramsOpenAndCloseTheirBlocksAndCallWhatIsThere) {
     for (const std::string& name : called) EXPECT_TRUE(programs.contains(name)) << name;
     for (const std::string& name : programs) EXPECT_LE(name.size(), 15U) << name;
     EXPECT_EQ(programs.size(), expected);
+  }
+}
+
+TEST(RobotDocs, TheUrProgramOpensAndClosesItsBlocksAndCallsWhatIsThere) {
+  const std::string code =
+      std::regex_replace(part_of(read_page(), "# binpick: fetch", "\n```"), std::regex{"\"[^\"\n]*\"|#[^\n]*"}, "");
+  EXPECT_EQ(count(code, "\n *(def|if|while) .*: *(?=\n)"), count(code, "\n *end *(?=\n|$)"));
+  expect_requests(read_page(), "ask\\((?:str_cat\\()?\"([a-z]+) ?\"", kRequests);
+  for (const char* name : {"to_path", "along_path", "say_broken", "scan", "pick", "report", "place", "retreat"}) {
+    EXPECT_EQ(count(code, (std::string{"\\bdef "} + name + "\\(").c_str()), 1) << name;
+    EXPECT_GE(count(code, (std::string{"\\b"} + name + "\\(").c_str()), 2) << name << " is called nowhere";
+  }
+}
+
+// Fetched, on record, to the start, begin until it may go, along it, end until it is taken, off the record, clear.
+TEST(RobotDocs, EachProgramCarriesTheScannerAndKnowsAfterARestartThatItDid) {
+  const std::string ur = read_page();
+  expect_in_order(
+      part_of(ur, "def scan():", "# --- start"),
+      {"binpick_scan = floor(answer[3])", "set_clear(False)", "to_path(path)", "while status != 5 and status != 52",
+       "\"begin \"", "if status == 5:", "along_path(path)", "while status != 2 and status != 52", "\"end \"",
+       "binpick_scan = 0", "say_broken()", "movej(q_clear", "set_clear(True)"});
+  expect_in_order(part_of(ur, "# --- start", "# --- the loop"), {"connect()", "if binpick_scan != 0", "say_broken()"});
+  expect_in_order(part_of(ur, "# --- the loop", "\n```"), {"ask(\"fetch\")", "elif status == 4:", "scan()"});
+
+  const std::string tp = part_of(read_page("fanuc"), "/PROG  BINPICK\n", "/POS");
+  expect_in_order(tp, {"IF R[90]<>0,JMP LBL[60]",
+                       "LBL[20:fetch]",
+                       "IF R[82]=4,JMP LBL[50]",
+                       "LBL[50:scan]",
+                       "R[90]=R[83]",
+                       "R[91]=R[85]",
+                       "DO[1]=OFF",
+                       "CALL BPTOPATH",
+                       "IF R[91]=0,JMP LBL[60]",
+                       "LBL[51:begin]",
+                       "R[81]=5",
+                       "IF R[82]=5,JMP LBL[53]",
+                       "IF R[82]=52,JMP LBL[56]",
+                       "JMP LBL[51]",
+                       "LBL[53:go]",
+                       "CALL BPPATH",
+                       "LBL[54:end]",
+                       "R[81]=6",
+                       "IF R[82]<>2 AND R[82]<>52,JMP LBL[54]",
+                       "LBL[56]",
+                       "R[90]=0",
+                       "J P[1]",
+                       "DO[1]=ON",
+                       "JMP LBL[20]",
+                       "LBL[60:broken]",
+                       "R[81]=7",
+                       "IF R[82]<>2 AND R[82]<>52,JMP LBL[60]",
+                       "R[90]=0",
+                       "JMP LBL[10]"});
+  const std::string karel = part_of(read_page("fanuc"), "PROGRAM bpcomm\n", "END bpcomm\n");
+  expect_in_order(karel, {"IF wanted < 5", "r_open", "ELSE", "r_scan", "CASE (3)", "'done '", "CASE (4)", "'failed '",
+                          "CASE (5)", "'begin '", "CASE (6)", "'end '", "CASE (7)", "'broken '"});
+  EXPECT_NE(karel.find("r_scan = 90\n"), std::string::npos);
+
+  const std::string as = read_page("kawasaki");
+  expect_in_order(part_of(as, ".PROGRAM bpcomm.pc", ".END"),
+                  {"bp_cmd == 5", "\"begin \"", "bp_cmd == 6", "\"end \"", "bp_cmd == 7", "\"broken \"", ".status == 4",
+                   "bp_asked = bp_f[3]", "bp_path = bp_f[5]", "bp_cmd = 0"});
+  expect_in_order(
+      part_of(as, ".PROGRAM bpscan", ".END"),
+      {"bp_scan = bp_asked", "SIGNAL -1", "CALL bptopath", "CALL bpbroken", "WHILE bp_status <> 5 AND bp_status <> 52",
+       "bpcall(5)", "IF bp_status == 5", "CALL bppath", "WHILE bp_status <> 2 AND bp_status <> 52", "bpcall(6)",
+       "bp_scan = 0", "JMOVE #bp_clear", "SIGNAL 1"});
+  expect_in_order(part_of(as, ".PROGRAM bpstart", ".END"), {"IF bp_scan <> 0", "CALL bpbroken", "IF bp_open <> 0"});
+  expect_in_order(part_of(as, ".PROGRAM binpick()", ".END"), {"bpcall(2)", ".status == 4", "CALL bpscan"});
+}
+
+TEST(RobotDocs, EachPageNamesTheKeysOfACellWhoseRobotCarriesTheScanner) {
+  std::ifstream file{std::string(BINPICK_SOURCE_DIR) + "/config/cell.example.toml"};
+  std::stringstream keys;
+  keys << file.rdbuf();
+  for (const char* make : kPages) {
+    const std::string page = read_page(make);
+    const std::string section = part_of(page, "When the robot carries the scanner\n", "\n## ");
+    const bool is_ur = std::string{make} == "universal-robots";
+    for (const std::string key : {"carrier", "T_flange_scanner", "scan_path", "path_timeout_ms", "pose_latency_ms",
+                                  is_ur ? "pose_address" : "pose_listen"}) {
+      EXPECT_NE(section.find(key), std::string::npos) << make << ": " << key;
+      EXPECT_NE(keys.str().find(key + " = "), std::string::npos) << key;
+    }
+    for (const char* alarm : {"**302,", "**300**", "**303**"})
+      EXPECT_NE(section.find(alarm), std::string::npos) << make << ": " << alarm;
+    EXPECT_EQ(page.find("of this version"), std::string::npos) << make;
   }
 }
 
