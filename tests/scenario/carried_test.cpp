@@ -2,16 +2,18 @@
 #include <gtest/gtest.h>
 #include <string>
 
+#include "tests/emulators/program/scan_paths.hpp"
 #include "tests/support/cell_file.hpp"
 #include "tests/support/emulated_cell.hpp"
 #include "tests/support/known_block.hpp"
-#include "tests/support/scan_paths.hpp"
 #include "tests/support/scenes.hpp"
 
 /// The robot carries the scanner: what it measures lies where it is, and what goes wrong on the way is an alarm with
 /// its cure, after which the cell picks again.
 namespace binpick::support {
 namespace {
+using emulators::kLinearPath;
+using emulators::kPanPath;
 using namespace std::chrono_literals;
 
 CellFile carried(const std::string& robot, std::uint16_t path) {

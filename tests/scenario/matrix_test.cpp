@@ -5,15 +5,17 @@
 #include <string>
 #include <vector>
 
+#include "tests/emulators/program/scan_paths.hpp"
 #include "tests/support/cell_file.hpp"
 #include "tests/support/emulated_cell.hpp"
-#include "tests/support/scan_paths.hpp"
 #include "tests/support/scenes.hpp"
 
 /// Every device of the trade's cells in every combination: each one whole pick, from the PLC's request to the robot's
 /// report, in virtual time.
 namespace binpick::support {
 namespace {
+using emulators::kLinearPath;
+using emulators::kPanPath;
 struct Combination {
   const char* scanner;
   std::uint16_t scan_path;  ///< 0: on the pivot; else the robot carries it.

@@ -1,7 +1,7 @@
 #include "tests/support/emulated_cell.hpp"
 
 #include "base/check.hpp"
-#include "tests/support/scan_paths.hpp"
+#include "tests/emulators/program/scan_paths.hpp"
 
 namespace binpick::support {
 namespace {
@@ -25,7 +25,7 @@ emulators::PivotOptions pivot_options(const config::Config& config, std::uint64_
 emulators::RobotOptions robot_options(const config::Config& config) {
   emulators::RobotOptions options;
   options.dialect = config.robot.dialect;
-  if (config.carrier == config::Carrier::Robot) options.paths = scan_paths(config);
+  if (config.carrier == config::Carrier::Robot) options.paths = emulators::scan_paths(config, config.supplies.front());
   return options;
 }
 

@@ -34,6 +34,8 @@ constexpr std::array kOrders{
     OrderWord{"take", Order::Kind::Take, "the highest object vanishes from the bin, as if a robot had taken it"},
     OrderWord{"refill", Order::Kind::Refill, "the bin is filled anew, with the next seed"},
     OrderWord{"robot restart", Order::Kind::RobotRestart, "the robot's program is stopped and started, where it is"},
+    OrderWord{"robot stop_on_path", Order::Kind::RobotStopOnPath,
+              "it stops in the middle of its next scan path, until \"robot restart\""},
     OrderWord{"plc restart", Order::Kind::PlcRestart, "power cycle of the PLC"},
     OrderWord{"plc abort", Order::Kind::PlcAbort, "the PLC raises abort"},
     OrderWord{"plc reset", Order::Kind::PlcReset, "the PLC raises reset"},
@@ -43,7 +45,7 @@ constexpr std::array kOrders{
     OrderWord{"quit", Order::Kind::Quit, "ends the program"},
 };
 
-constexpr std::array kDevices{Device::Pivot, Device::Scanner, Device::Robot, Device::Plc};
+constexpr std::array kDevices{Device::Pivot, Device::Scanner, Device::Robot, Device::Poses, Device::Plc};
 
 std::vector<std::string> split(std::string_view line) {
   std::istringstream stream{std::string(line)};
@@ -108,6 +110,8 @@ std::string_view to_string(Device device) {
       return "scanner";
     case Device::Robot:
       return "robot";
+    case Device::Poses:
+      return "poses";
     case Device::Plc:
       return "plc";
   }
@@ -132,7 +136,7 @@ std::string command_help() {
   const auto add = [&text](const std::string& command, std::string_view help) {
     text += "  " + command + std::string(command.size() < 34 ? 34 - command.size() : 1, ' ') + std::string(help) + "\n";
   };
-  text += "DEVICE is pivot, scanner, robot or plc.\n";
+  text += "DEVICE is pivot, scanner, robot, poses (of a robot that carries the scanner) or plc.\n";
   for (const Switch& one : kSwitches) add("DEVICE " + std::string(one.name) + " [on/off]", one.help);
   add("DEVICE delay MS", "added to every answer");
   add("DEVICE disconnect_after_bytes N", "the device cuts its link once, after N more bytes");

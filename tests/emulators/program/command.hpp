@@ -11,7 +11,7 @@
 
 /// What is typed at a running binpick-emulator, or given by --fault: one command per line.
 namespace binpick::emulators {
-enum class Device { Pivot, Scanner, Robot, Plc };
+enum class Device { Pivot, Scanner, Robot, Poses, Plc };  ///< Poses: of a robot that carries the scanner.
 std::string_view to_string(Device device);
 
 /// "scanner silent on", "pivot error_code 5", "robot healthy".
@@ -20,14 +20,15 @@ struct FaultCommand {
   std::function<void(Faults&)> apply;
   std::string text;  ///< As it was understood, for the confirmation.
 };
-/// "pick", "take", "refill", "robot restart", "plc restart", "plc abort", "plc reset", "pivot power_cycle", "status",
-/// "help", "quit".
+/// "pick", "take", "refill", "robot restart", "robot stop_on_path", "plc restart", "plc abort", "plc reset", "pivot
+/// power_cycle", "status", "help", "quit".
 struct Order {
   enum class Kind {
     Pick,
     Take,
     Refill,
     RobotRestart,
+    RobotStopOnPath,
     PlcRestart,
     PlcAbort,
     PlcReset,

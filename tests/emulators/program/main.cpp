@@ -95,7 +95,7 @@ int main(int argc, char** argv) {
   };
   device(Device::Plc, "the PLC, as Modbus/TCP client of the daemon");
   device(Device::Pivot, "the Schunk PR 70 on its CAN bus");
-  device(Device::Scanner, "the SICK LMS 400 over the emulated pivot and bin");
+  device(Device::Scanner, "the line scanner that scanner.model names, over the emulated bin");
   device(Device::Robot, "the arm of the make that robot.dialect names, as client of the daemon");
   auto* cell = app.add_subcommand("cell", "all four");
   cell->fallthrough();

@@ -74,29 +74,7 @@ Lms400Port::Lms400Port(link::Loop& loop, const std::string& listen, Lms400::Meas
     : scanner{std::move(measure), {.seed = seed}},
       server_{loop,
               endpoint(listen, "scanner"),
-              {
-                  .on_accept =
-                      [this](link::ConnectionId id, const std::string&, std::uint16_t, TimePoint now) {
-                        if (scanner.faults.unplugged) return false;
-                        if (connection_ != 0) scanner.on_disconnected(now);
-                        connection_ = id;
-                        scanner.on_connected(now);
-                        return true;
-                      },
-                  .on_bytes =
-                      [this](link::ConnectionId id, ByteView bytes, TimePoint now) {
-                        if (id == connection_) scanner.on_bytes(bytes, now);
-                      },
-                  .on_closed =
-                      [this](link::ConnectionId id, TimePoint now) {
-                        if (id != connection_) return;
-                        connection_ = 0;
-                        scanner.on_disconnected(now);
-                      },
-                  .take_output =
-                      [this](link::ConnectionId id) { return id == connection_ ? scanner.take_output() : Bytes{}; },
-                  .wants_close = [this](link::ConnectionId id) { return id != connection_ || scanner.wants_close(); },
-              },
+              serve_one(scanner, connection_),
               {.connections_max = 2, .newest_wins = true, .unsent_bytes_max = 4 << 20}} {}
 
 void Lms400Port::turn(TimePoint now) {
@@ -138,31 +116,8 @@ std::unique_ptr<ScannerPort> open_scanner(link::Loop& loop, const config::Config
 PlcPort::PlcPort(link::Loop& loop, const link::Endpoint& endpoint, Plc plc)
     : ClientPort{loop, endpoint, std::move(plc)} {
   if (!device.is_server()) return;
-  server_.emplace(
-      loop, endpoint,
-      link::ServerPeer{
-          .on_accept =
-              [this](link::ConnectionId id, const std::string&, std::uint16_t, TimePoint now) {
-                if (device.faults.unplugged) return false;
-                if (connection_ != 0) device.on_disconnected(now);
-                connection_ = id;
-                device.on_connected(now);
-                return true;
-              },
-          .on_bytes =
-              [this](link::ConnectionId id, ByteView bytes, TimePoint now) {
-                if (id == connection_) device.on_bytes(bytes, now);
-              },
-          .on_closed =
-              [this](link::ConnectionId id, TimePoint now) {
-                if (id != connection_) return;
-                connection_ = 0;
-                device.on_disconnected(now);
-              },
-          .take_output = [this](link::ConnectionId id) { return id == connection_ ? device.take_output() : Bytes{}; },
-          .wants_close = [this](link::ConnectionId id) { return id != connection_; },
-      },
-      link::TcpServerOptions{.connections_max = 2, .newest_wins = true});
+  server_.emplace(loop, endpoint, serve_one(device, connection_),
+                  link::TcpServerOptions{.connections_max = 2, .newest_wins = true});
 }
 
 void PlcPort::turn(TimePoint now) {

@@ -55,6 +55,40 @@ class PivotPort {
   std::thread thread_;
 };
 
+/// A server of which one connection counts, the newest; `connection` is its number, 0: none.
+template <class Device>
+drivers::link::ServerPeer serve_one(Device& device, drivers::link::ConnectionId& connection) {
+  using drivers::link::ConnectionId;
+  return {
+      .on_accept =
+          [&](ConnectionId id, const std::string&, std::uint16_t, TimePoint now) {
+            if (device.faults.unplugged) return false;
+            if (connection != 0) device.on_disconnected(now);
+            connection = id;
+            device.on_connected(now);
+            return true;
+          },
+      .on_bytes =
+          [&](ConnectionId id, ByteView bytes, TimePoint now) {
+            if (id == connection) device.on_bytes(bytes, now);
+          },
+      .on_closed =
+          [&](ConnectionId id, TimePoint now) {
+            if (id != connection) return;
+            connection = 0;
+            device.on_disconnected(now);
+          },
+      .take_output = [&](ConnectionId id) { return id == connection ? device.take_output() : Bytes{}; },
+      .wants_close =
+          [&](ConnectionId id) {
+            if constexpr (requires { device.wants_close(); })
+              return id != connection || device.wants_close();
+            else
+              return id != connection;
+          },
+  };
+}
+
 /// The scanner on its socket, whatever it speaks.
 class ScannerPort {
  public:
@@ -118,7 +152,11 @@ class ClientPort {
     if (!link_) return;
     link_->on_deadline(now);
     link_->flush(now);
-    if (device.take_reopen()) link_->reopen(now);
+    if constexpr (requires { device.take_reopen(); }) {
+      if (device.take_reopen()) link_->reopen(now);
+    } else if (link_->connected() && device.wants_close()) {
+      link_->reopen(now);
+    }
   }
   std::optional<TimePoint> deadline() const {
     return earlier(device.deadline(), link_ ? link_->deadline() : std::nullopt);

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "tests/emulators/program/pick_line.hpp"
+#include "tests/emulators/program/scan_paths.hpp"
 
 namespace binpick::emulators {
 namespace link = drivers::link;
@@ -41,6 +42,19 @@ link::Endpoint daemon_at(const std::string& listen, const std::string& host, con
   return *endpoint;
 }
 
+/// The emulated robot was taught a path under whatever number the cell file gives it: over the supply in a line, or,
+/// for kPanPath, turning.
+RobotOptions robot_options(const config::Config& config, const config::Supply& supply, std::uint64_t seed) {
+  RobotOptions options;
+  options.dialect = config.robot.dialect;
+  options.seed = seed;
+  if (config.carrier != config::Carrier::Robot) return options;
+  options.paths = scan_paths(config, supply);
+  const ScanPath line = options.paths.at(kLinearPath);
+  options.paths.emplace(supply.scan_path, line);
+  return options;
+}
+
 int open_signals() {
   sigset_t set;
   sigemptyset(&set);
@@ -52,6 +66,11 @@ int open_signals() {
 
 Run::Run(const config::Config& config, const RunOptions& options)
     : config_{config}, options_{options}, signals_{open_signals()}, bin_{config, options.bin} {
+  const bool carried = config.carrier == config::Carrier::Robot;
+  if (carried) options_.devices.erase(Device::Pivot);  // there is none
+  if (options_.devices.contains(Device::Scanner) && !options_.devices.contains(carried ? Device::Robot : Device::Pivot))
+    throw std::runtime_error(carried ? "the scanner's view moves with the robot: play both, \"scanner robot\""
+                                     : "the scanner's view turns with the pivot: play both, \"pivot scanner\"");
   open_devices();
 }
 
@@ -69,16 +88,19 @@ void Run::open_devices() {
     pivot_ = std::make_unique<PivotPort>(config_.pivot_can, pivot);
   }
   if (options_.devices.contains(Device::Scanner)) {
-    if (!pivot_) throw std::runtime_error("the scanner's view turns with the pivot: play both, \"pivot scanner\"");
-    const ScannerPlace place{config_.mount.T_base_pivot, config_.mount.T_pivot_scanner, supply.T_base_supply};
-    scanner_ = open_scanner(loop_, config_, bin_.world(),
-                            on_pivot(place, [this](TimePoint at) { return pivot_->angle_at(at); }), options_.bin.seed);
+    scanner_ = open_scanner(loop_, config_, bin_.world(), where_scanner(supply), options_.bin.seed);
   }
   if (options_.devices.contains(Device::Robot)) {
     if (config_.robot_listen.empty())
       throw std::runtime_error("robot.listen is empty: this cell's PLC moves the robot");
     robot_ = std::make_unique<RobotPort>(loop_, daemon_at(config_.robot_listen, options_.daemon_host, "robot.listen"),
-                                         Robot{{.dialect = config_.robot.dialect, .seed = options_.bin.seed}});
+                                         Robot{robot_options(config_, supply, options_.bin.seed)});
+    if (config_.carrier == config::Carrier::Robot)
+      poses_ = std::make_unique<PosePort>(
+          loop_, config_,
+          config_.pose_listen.empty() ? link::Endpoint{}
+                                      : daemon_at(config_.pose_listen, options_.daemon_host, "robot.pose_listen"),
+          [this](TimePoint at) { return robot_->device.flange_at(at); }, options_.bin.seed);
     robot_->device.on_grasp = [this](const drivers::robot::Pick& pick) {
       picks_[pick.pick_id].nearest = bin_.nearest(pick.T_base_grasp);
       return bin_.take(pick.T_base_grasp);
@@ -98,6 +120,14 @@ void Run::open_devices() {
   }
 }
 
+WhereScanner Run::where_scanner(const config::Supply& supply) {
+  if (config_.carrier == config::Carrier::Robot)
+    return on_flange(supply.T_base_supply, config_.T_flange_scanner,
+                     [this](TimePoint at) { return robot_->device.flange_at(at); });
+  const ScannerPlace place{config_.mount.T_base_pivot, config_.mount.T_pivot_scanner, supply.T_base_supply};
+  return on_pivot(place, [this](TimePoint at) { return pivot_->angle_at(at); });
+}
+
 void Run::say_bin(const char* what) const {
   say("bin: %s%zu of %s, %zu of them over or under another, seed %llu", what, bin_.objects_left(),
       config_.recipes.at(options_.bin.recipe).part.options.name.c_str(), bin_.overlapping(),
@@ -110,6 +140,11 @@ void Run::print_addresses() const {
         to_string(options_.pivot.value_or(config_.pivot.protocol)));
   if (scanner_) say("scanner: listens at %s", config_.scanner_address.c_str());
   if (robot_) say("robot:   connects to the daemon's robot.listen, %s", config_.robot_listen.c_str());
+  if (poses_)
+    say("         it carries the scanner along path %u; its poses: %s",
+        config_.supplies.at(options_.bin.supply).scan_path,
+        config_.pose_listen.empty() ? ("RTDE at " + config_.pose_address).c_str()
+                                    : ("as lines to the daemon's robot.pose_listen, " + config_.pose_listen).c_str());
   if (plc_)
     say(plc_->device.is_server() ? "PLC:     listens at %s" : "PLC:     connects to the daemon's plc.listen, %s",
         config_.plc_line().c_str());
@@ -150,6 +185,7 @@ std::optional<TimePoint> Run::deadline() const {
   std::optional<TimePoint> next;
   if (scanner_) next = earlier(next, scanner_->deadline());
   if (robot_) next = earlier(next, robot_->deadline());
+  if (poses_) next = earlier(next, poses_->deadline());
   if (plc_) next = earlier(next, plc_->deadline());
   if (bin_.refilling() || plc_) next = earlier(next, SystemClock{}.now() + 50ms);  // the PLC's program scans
   return next;
@@ -158,6 +194,7 @@ std::optional<TimePoint> Run::deadline() const {
 void Run::turn_devices(TimePoint now) {
   if (scanner_) scanner_->turn(now);
   if (robot_) robot_->turn(now);
+  if (poses_) poses_->turn(now);
   if (plc_) plc_->turn(now);
 }
 
@@ -235,6 +272,9 @@ void Run::turn_robot(TimePoint now) {
       if (answered->status != Status::ReportTaken)
         how += ", report answered with status " + std::to_string(static_cast<int>(answered->status));
       finish_pick(answered->pick_id, how, now);
+    } else if (const auto* scanned = std::get_if<Robot::ScanAnswered>(&*event); scanned && scanned->broken) {
+      say("robot: told of scan %u that it is broken off, answered with status %d", scanned->scan,
+          static_cast<int>(scanned->status));
     } else if (const auto* trouble = std::get_if<Robot::Trouble>(&*event)) {
       say("robot: %s", trouble->text.c_str());
     }
@@ -312,6 +352,10 @@ void Run::obey(const FaultCommand& command) {
       played = robot_ != nullptr;
       if (played) command.apply(robot_->device.faults);
       break;
+    case Device::Poses:
+      played = poses_ != nullptr;
+      if (played) command.apply(poses_->faults());
+      break;
     case Device::Plc:
       played = plc_ != nullptr;
       if (played) command.apply(plc_->device.faults);
@@ -341,6 +385,11 @@ void Run::obey(Order::Kind order, TimePoint now) {
       break;
     case Order::Kind::RobotRestart:
       if (played(robot_ != nullptr, Device::Robot)) robot_->device.restart_program(now);
+      break;
+    case Order::Kind::RobotStopOnPath:
+      if (!played(poses_ != nullptr, Device::Poses)) break;
+      robot_->device.stops_at = 0.5;
+      robot_->device.tells_of_stop = false;
       break;
     case Order::Kind::PlcRestart:
       if (played(plc_ != nullptr, Device::Plc)) plc_->device.restart();

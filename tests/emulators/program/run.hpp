@@ -12,7 +12,7 @@
 #include "drivers/link/loop.hpp"
 #include "tests/emulators/program/bin.hpp"
 #include "tests/emulators/program/command.hpp"
-#include "tests/emulators/program/ports.hpp"
+#include "tests/emulators/program/pose_port.hpp"
 
 namespace binpick::emulators {
 struct RunOptions {
@@ -49,6 +49,7 @@ class Run {
   enum class Step { Idle, Asked, Robot };
 
   void open_devices();
+  WhereScanner where_scanner(const config::Supply& supply);
   void say_bin(const char* what) const;
   void print_addresses() const;
   void on_line(const std::string& line, TimePoint now);
@@ -74,6 +75,7 @@ class Run {
   std::unique_ptr<PivotPort> pivot_;
   std::unique_ptr<ScannerPort> scanner_;
   std::unique_ptr<RobotPort> robot_;
+  std::unique_ptr<PosePort> poses_;  ///< Of a robot that carries the scanner.
   std::unique_ptr<PlcPort> plc_;
   std::string typed_;
   std::optional<int> status_;

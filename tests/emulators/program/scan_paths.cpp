@@ -1,9 +1,9 @@
-#include "tests/support/scan_paths.hpp"
+#include "tests/emulators/program/scan_paths.hpp"
 
 #include <cmath>
 #include <numbers>
 
-namespace binpick::support {
+namespace binpick::emulators {
 namespace {
 /// How the scanner is carried, by what it can see: its height over the floor, its speeds, and how far beyond the
 /// supply's walls it goes.
@@ -23,8 +23,7 @@ Eigen::Isometry3d scanner_over(double y_mm, double height_mm, double pan_rad) {
 }
 }  // namespace
 
-std::map<std::uint16_t, emulators::ScanPath> scan_paths(const config::Config& config) {
-  const config::Supply& supply = config.supplies.front();
+std::map<std::uint16_t, ScanPath> scan_paths(const config::Config& config, const config::Supply& supply) {
   const Manner manner = manner_of(config);
   const auto flange = [&](double y_mm, double pan_rad) {
     const Transform<frame::Supply, frame::Scanner> T_supply_scanner{scanner_over(y_mm, manner.height_mm, pan_rad)};
@@ -37,4 +36,4 @@ std::map<std::uint16_t, emulators::ScanPath> scan_paths(const config::Config& co
       {kPanPath,
        {flange(0, -pan_rad), flange(0, pan_rad), from_s(2 * pan_rad * 180 / std::numbers::pi / manner.speed_deg_s)}}};
 }
-}  // namespace binpick::support
+}  // namespace binpick::emulators

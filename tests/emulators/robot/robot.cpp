@@ -72,8 +72,10 @@ std::optional<Robot::Event> Robot::take_event() {
 }
 
 void Robot::restart_program(TimePoint now) {
-  if (motion_ == Motion::Stopped) motion_ = Motion::PathOver;
-  if (motion_ != Motion::None && motion_ != Motion::PathOver) {
+  if (is_on_scan()) {
+    halt(now);
+    motion_ = Motion::PathOver;
+  } else if (motion_ != Motion::None && motion_ != Motion::PathOver) {
     motion_ = Motion::Retreat;
     motion_until_ = now + options_.retreat;
   }
@@ -85,6 +87,7 @@ void Robot::update(TimePoint now) {
   now_ = now;
   if (std::exchange(stopped_before_, faults.emergency_stop) != faults.emergency_stop) {
     if (faults.emergency_stop) {
+      if (is_on_scan()) halt(now);
       if (connected_) fail_link("emergency stop: the program is stopped");
     } else {
       restart_program(now);
@@ -145,6 +148,19 @@ void Robot::talk(TimePoint now) {
   ask({gripped_ ? Request::Kind::Done : Request::Kind::Failed, std::max<std::uint16_t>(id, 1)}, Waiting::Report, now);
 }
 
+/// Between the answer that asks for a scan and the word that its path is over.
+bool Robot::is_on_scan() const {
+  return motion_ == Motion::ToPath || motion_ == Motion::AtPath || motion_ == Motion::OnPath ||
+         motion_ == Motion::Stopped;
+}
+
+/// The arm stops where it is on its way to the path, or along it: the path is broken off.
+void Robot::halt(TimePoint now) {
+  if (motion_ != Motion::Stopped)
+    path_share_ = path_began_ ? std::min(in_s(now - *path_began_) / in_s(path_->duration), path_share_) : 0;
+  motion_ = Motion::Stopped;
+}
+
 /// The program stands at a place where it speaks with the cell.
 bool Robot::may_talk() const {
   return motion_ == Motion::None || motion_ == Motion::AtPath || motion_ == Motion::PathOver;
@@ -183,7 +199,7 @@ void Robot::on_reply(const Reply& reply, TimePoint now) {
       break;
     case Waiting::PathReport:
       motion_ = Motion::None;
-      events_.push_back(ScanAnswered{scan_, reply.status});
+      events_.push_back(ScanAnswered{scan_, path_share_ < 1, reply.status});
       next_poll_ = now;
       break;
     case Waiting::Fetch:

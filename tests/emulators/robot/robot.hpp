@@ -55,6 +55,7 @@ class Robot {
   };
   struct ScanAnswered {
     std::uint16_t scan;
+    bool broken;
     drivers::robot::Status status;
   };  ///< To the word that its path has ended, or was broken off.
   struct Trouble {
@@ -109,6 +110,8 @@ class Robot {
   void ask(const drivers::robot::Request& request, Waiting waiting, TimePoint now);
   void on_reply(const drivers::robot::Reply& reply, TimePoint now);
   bool may_talk() const;
+  bool is_on_scan() const;
+  void halt(TimePoint now);
   void fail_link(const std::string& text);
   void send_due(TimePoint now);
   void send(std::byte byte);

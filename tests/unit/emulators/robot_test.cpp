@@ -73,6 +73,9 @@ class RobotPair : public testing::TestWithParam<Dialect> {
           ++(reported->done ? done : failed)[reported->pick_id];
           if (offers_more) offer();
         }
+        if (std::holds_alternative<drivers::robot::PathBegun>(*event)) session.let_go();
+        paths_ended += std::holds_alternative<drivers::robot::PathEnded>(*event);
+        paths_broken += std::holds_alternative<drivers::robot::PathBroken>(*event);
         if (const auto* lost_event = std::get_if<drivers::robot::Lost>(&*event)) lost.push_back(lost_event->text);
       }
       while (auto event = robot.take_event()) events.push_back(std::move(*event));
@@ -115,13 +118,22 @@ class RobotPair : public testing::TestWithParam<Dialect> {
     }
   }
 
+  static ScanPath straight_path() {
+    ScanPath path;
+    path.T_base_end.iso.translation() = Eigen::Vector3d{0, 500, 0};
+    path.duration = 2s;
+    return path;
+  }
+  double along_path_mm() const { return robot.flange_at(now).iso.translation().y(); }
+
   TimePoint now{1h};
   Session session{{.dialect = GetParam()}};
-  Robot robot{{.dialect = GetParam()}};
+  Robot robot{{.dialect = GetParam(), .paths = {{1, straight_path()}}}};
   bool linked = false, offers_more = true, object_is_there = true;
   bool byte_by_byte = false;  // how answers reach the robot
   TimePoint link_again{};
   std::uint16_t last_id = 0;
+  int paths_ended = 0, paths_broken = 0;
   std::map<std::uint16_t, int> grasps, done, failed;
   std::vector<std::string> lost;
   std::vector<Robot::Event> events;
@@ -224,6 +236,37 @@ TEST_P(RobotPair, EmergencyStopAtAnyMomentStopsEverythingAndThenItGoesOn) {
     EXPECT_TRUE(session.connected());
   }
   expect_each_pick_once();
+}
+
+TEST_P(RobotPair, AScanPathIsRunOnceFromItsBeginningToItsEnd) {
+  session.ask_path(1, 1);
+  run_for(1500ms);
+  EXPECT_GT(along_path_mm(), 0);
+  EXPECT_LT(along_path_mm(), 500);
+  run_for(10s);
+  EXPECT_EQ(paths_ended, 1);
+  EXPECT_EQ(paths_broken, 0);
+}
+
+TEST_P(RobotPair, AProgramThatIsStoppedAnywhereInAScanStandsAndSaysSoWhenItIsStarted) {
+  for (int i = 0; i < 120; ++i) {
+    session.ask_path(static_cast<std::uint16_t>(i + 1), 1);
+    run_for(150ms + std::chrono::milliseconds(27 * i));  // it has been told of it by now
+    robot.faults.emergency_stop = i % 2 == 0;
+    if (i % 2 != 0) robot.restart_program(now);
+    run_for(1ms);
+    const double stopped_mm = along_path_mm();
+    run_for(700ms);
+    EXPECT_EQ(along_path_mm(), stopped_mm) << i;
+    robot.faults.emergency_stop = false;
+    run_for(5s);
+    EXPECT_EQ(paths_ended + paths_broken, i + 1) << i;
+  }
+  EXPECT_GT(paths_broken, 60);
+  EXPECT_GT(paths_ended, 5) << "those that were over, or not begun";
+  offer();
+  run_for(3s);
+  EXPECT_GT(total(done), 0);
 }
 
 TEST_P(RobotPair, ASilentRobotIsTakenForGoneAndComesBack) {
