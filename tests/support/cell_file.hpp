@@ -25,6 +25,7 @@ struct CellFile {
   double frequency_hz = 360;
   double resolution_deg = 0.25;
   double scanner_latency_ms = 0;
+  std::uint16_t pose_port = 30004;
   double pose_latency_ms = 0;  ///< Where the robot carries the scanner.
   int detect_timeout_ms = 5000;
   std::string state_dir;

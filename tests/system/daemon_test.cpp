@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
+#include "tests/emulators/program/scan_paths.hpp"
 #include "tests/support/scenes.hpp"
 #include "tests/system/system_cell.hpp"
 
@@ -33,6 +34,33 @@ TEST_P(DaemonAndPivot, MakeAWholePick) {
   ASSERT_TRUE(cell.run_until([&] { return cell.robot().picks_done() == 1; }));
 }
 INSTANTIATE_TEST_SUITE_P(Both, DaemonAndPivot, testing::Values("powercube", "motion"));
+
+struct Carrying {
+  const char* name;
+  const char* scanner;
+  const char* robot;
+};
+struct CarriedScanner : testing::TestWithParam<Carrying> {};
+
+TEST_P(CarriedScanner, IsMovedByTheRobotForAWholePick) {
+  CellFile file = coarse_cell();
+  file.scanner = GetParam().scanner;
+  file.robot = GetParam().robot;
+  file.scan_path = emulators::kLinearPath;
+  const bool is_small = file.scanner != "lms400";
+  if (is_small) file.parts = {"contact_bridge"};
+  SystemCell cell{file, is_small ? scene_of("contact_bridge", 6, 11, kSmallBox_mm) : scene_of("track_link", 3, 2)};
+  ASSERT_TRUE(cell.run_until_ready());
+  const auto result = cell.pick();
+  ASSERT_TRUE(result.has_value());
+  EXPECT_EQ(result->code, plc::ResultCode::PickFound);
+  ASSERT_TRUE(cell.run_until([&] { return cell.robot().picks_done() == 1; }));
+}
+
+INSTANTIATE_TEST_SUITE_P(Robots, CarriedScanner,
+                         testing::Values(Carrying{"ur_rtde", "lms400", "ur"}, Carrying{"fanuc_lines", "lps36", "fanuc"},
+                                         Carrying{"kawasaki_lines", "lps36hi", "kawasaki"}),
+                         [](const auto& one) { return std::string{one.param.name}; });
 
 TEST(Daemon, PollsAPlcThatIsTheServerAndTellsItWhenItEnds) {
   CellFile file = coarse_cell();

@@ -14,6 +14,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "tests/emulators/program/scan_paths.hpp"
+
 extern char** environ;
 
 namespace binpick::support {
@@ -72,6 +74,7 @@ SystemCell::SystemCell(CellFile file, emulators::World scene) : file_{std::move(
   file_.scanner_port = free_port(SOCK_STREAM);
   file_.robot_port = free_port(SOCK_STREAM);
   file_.can_port = free_port(SOCK_DGRAM);
+  file_.pose_port = free_port(SOCK_STREAM);
   file_.state_dir = test_folder().path() + "/state";
   cell_path_ = test_folder().write(file_, "system.toml");
   log_path_ = test_folder().path() + "/daemon.log";
@@ -80,16 +83,27 @@ SystemCell::SystemCell(CellFile file, emulators::World scene) : file_{std::move(
   if (!config) throw std::runtime_error(to_string(config.error().front()));
   config_ = std::move(*config);
 
-  emulators::PivotOptions pivot;
-  pivot.protocol = config_->pivot.protocol;
-  pivot.referenced = true;
-  pivot_ = std::make_unique<emulators::PivotPort>(config_->pivot_can, pivot);
-  const emulators::ScannerPlace place{config_->mount.T_base_pivot, config_->mount.T_pivot_scanner,
-                                      config_->supplies.front().T_base_supply};
-  scanner_ = emulators::open_scanner(
-      loop_, *config_, world_, emulators::on_pivot(place, [this](TimePoint at) { return pivot_->angle_at(at); }), 1);
+  const config::Supply& supply = config_->supplies.front();
+  emulators::RobotOptions robot{.dialect = config_->robot.dialect};
+  emulators::WhereScanner where;
+  if (config_->carrier == config::Carrier::Robot) {
+    robot.paths = emulators::scan_paths(*config_, supply);
+    const emulators::FlangeMotion flange = [this](TimePoint at) { return robot_->device.flange_at(at); };
+    poses_ = std::make_unique<emulators::PosePort>(loop_, *config_,
+                                                   drivers::link::Endpoint{"127.0.0.1", file_.pose_port}, flange, 1);
+    where = emulators::on_flange(supply.T_base_supply, config_->T_flange_scanner, flange);
+  } else {
+    emulators::PivotOptions pivot;
+    pivot.protocol = config_->pivot.protocol;
+    pivot.referenced = true;
+    pivot_ = std::make_unique<emulators::PivotPort>(config_->pivot_can, pivot);
+    const emulators::ScannerPlace place{config_->mount.T_base_pivot, config_->mount.T_pivot_scanner,
+                                        supply.T_base_supply};
+    where = emulators::on_pivot(place, [this](TimePoint at) { return pivot_->angle_at(at); });
+  }
+  scanner_ = emulators::open_scanner(loop_, *config_, world_, std::move(where), 1);
   robot_ = std::make_unique<emulators::RobotPort>(loop_, *drivers::link::parse_endpoint(config_->robot_listen),
-                                                  emulators::Robot{{.dialect = config_->robot.dialect}});
+                                                  emulators::Robot{robot});
   emulators::PlcOptions plc;
   plc.cell_role = config_->plc.role;
   plc_ = std::make_unique<emulators::PlcPort>(loop_, *drivers::link::parse_endpoint(config_->plc_line()),
@@ -128,13 +142,15 @@ bool SystemCell::run_until(const std::function<bool()>& done, Duration limit) {
     plc_->device.set_robot_clear(robot_->device.clear_of_view());
     scanner_->turn(now);
     robot_->turn(now);
+    if (poses_) poses_->turn(now);
     plc_->turn(now);
     while (robot_->device.take_event()) {
     }
     if (done()) return true;
     if (now >= until) return false;
     // Processes and the pivot's thread are looked at every 5 ms; everything else wakes the loop.
-    const auto next = earlier(earlier(scanner_->deadline(), robot_->deadline()), plc_->deadline());
+    const auto next = earlier(earlier(scanner_->deadline(), robot_->deadline()),
+                              earlier(plc_->deadline(), poses_ ? poses_->deadline() : std::nullopt));
     now = loop_.wait(earlier(next, std::min(until, now + std::chrono::milliseconds(5))));
   }
 }

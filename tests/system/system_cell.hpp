@@ -10,7 +10,7 @@
 #include "base/clock.hpp"
 #include "config/config.hpp"
 #include "drivers/link/loop.hpp"
-#include "tests/emulators/program/ports.hpp"
+#include "tests/emulators/program/pose_port.hpp"
 #include "tests/emulators/world/world.hpp"
 #include "tests/support/cell_file.hpp"
 
@@ -52,7 +52,8 @@ class SystemCell {
   std::optional<config::Config> config_;
   emulators::World world_;
   drivers::link::Loop loop_;
-  std::unique_ptr<emulators::PivotPort> pivot_;
+  std::unique_ptr<emulators::PivotPort> pivot_;  ///< Or, where the robot carries the scanner, poses_.
+  std::unique_ptr<emulators::PosePort> poses_;
   std::unique_ptr<emulators::ScannerPort> scanner_;
   std::unique_ptr<emulators::RobotPort> robot_;
   std::unique_ptr<emulators::PlcPort> plc_;
