@@ -85,6 +85,13 @@ void check_servers(const Config& c, const CellPlaces& at, Findings& findings) {
                      "; use less, or a longer time-out");
   }
   const bool polls = c.plc.role == plc::LineRole::Client;
+  if (const auto beat = c.plc.heartbeat_timeout; polls && beat.count() > 0 && beat < 2 * c.plc.poll) {
+    const bool poll_given = at.given("plc", "poll_ms");
+    findings.add(at.of("plc", poll_given ? "poll_ms" : "heartbeat_timeout_ms"),
+                 "plc.heartbeat_timeout_ms = " + ms(beat) + " is less than two polls of " + ms(c.plc.poll) +
+                     " ms, the PLC would be taken for lost between them; poll more often, or use at least " +
+                     ms(2 * c.plc.poll));
+  }
   if (polls && c.plc.address.empty())
     findings.add(at.of("plc", "role"),
                  "plc.role is \"client\", but where the PLC's Modbus server is does not stand there; write address = "

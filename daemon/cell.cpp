@@ -17,6 +17,7 @@ plc::Options with_ids(const config::Config& config) {
   plc::Options options = config.plc;
   options.part_ids.clear();
   options.supply_ids.clear();
+  options.awaits_robot_clear = config.carrier != config::Carrier::Robot;
   for (const auto& recipe : config.recipes) options.part_ids.push_back(recipe.id);
   for (const auto& supply : config.supplies) options.supply_ids.push_back(supply.id);
   return options;
@@ -26,6 +27,9 @@ std::optional<drivers::robot::PoseSource> poses_of(const config::Config& config)
   if (config.carrier != config::Carrier::Robot) return std::nullopt;
   return drivers::robot::PoseSource{config.pose_options()};
 }
+
+/// Each start of the daemon has some thousand scan numbers of its own before it meets those of the start before.
+std::uint16_t scans_before(std::uint16_t boot_count) { return static_cast<std::uint16_t>(boot_count * 4099U); }
 
 std::uint16_t to_u16(double value) { return static_cast<std::uint16_t>(std::clamp(std::lround(value), 0L, 65535L)); }
 }  // namespace
@@ -39,7 +43,9 @@ Cell::Cell(std::shared_ptr<const CellData> data, std::uint16_t boot_count)
       robot_{data_->config.robot},
       poses_{poses_of(data_->config)},
       pivot_carrier_{pivot_},
-      robot_carrier_{poses_ ? std::make_optional<drivers::sweep::RobotCarrier>(robot_, *poses_) : std::nullopt},
+      robot_carrier_{poses_
+                         ? std::make_optional<drivers::sweep::RobotCarrier>(robot_, *poses_, scans_before(boot_count))
+                         : std::nullopt},
       sweep_{carrier(), scanner_} {
   robot_.withdraw(drivers::robot::NoPick::NotReady);
 }

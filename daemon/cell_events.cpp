@@ -92,8 +92,10 @@ void Cell::on(const plc::Event& event, TimePoint now) {
                  },
                  [&](const plc::AnswerWithdrawn&) { robot_.withdraw(drivers::robot::NoPick::NotReady); },
                  [&](const plc::CycleTimedOut&) {
-                   BINPICK_LOG(Warning, "cell", "cycle %llu took too long and is given up",
-                               static_cast<unsigned long long>(cycle_id_));
+                   const bool sweeps = sweep_.state() != drivers::sweep::State::Idle;
+                   BINPICK_LOG(Warning, "cell", "cycle %llu took too long and is given up%s%s",
+                               static_cast<unsigned long long>(cycle_id_), sweeps ? ": " : "",
+                               sweeps ? carrier().overdue().c_str() : "");
                    apply(CellInput::Cancelled, now);
                  },
                  [&](const plc::ResetRaised&) { BINPICK_LOG(Notice, "cell", "reset by the PLC"); },
@@ -205,11 +207,17 @@ void Cell::on(drivers::sweep::Event& event, TimePoint now) {
             } else {
               plc_.clear(plc::Alarm::ScannerProfilesLost, now);
             }
+            if (done.profiles_without_pose > 0)
+              BINPICK_LOG(Warning, "cell",
+                          "cycle %llu: %zu profiles left out, where the scanner was is not known of them",
+                          static_cast<unsigned long long>(cycle_id_), done.profiles_without_pose);
             apply(CellInput::SweepDone, now);
           },
           [&](const drivers::sweep::Failed& failed) {
             using Device = drivers::sweep::Failed::Device;
-            cycle_alarm_ = failed.device == Device::Carrier && robot_carrier_
+            cycle_alarm_ = failed.device == Device::Poses
+                               ? (robot_carrier_ ? plc::Alarm::RobotPosesLost : plc::Alarm::PivotNoReply)
+                           : failed.device == Device::Carrier && robot_carrier_
                                ? poses_alarm_.value_or(plc::Alarm::RobotPathBroken)
                            : failed.device == Device::Carrier ? pivot_alarm_.value_or(plc::Alarm::PivotModuleError)
                            : failed.device == Device::Scanner ? scanner_alarm_.value_or(plc::Alarm::ScannerNoReply)

@@ -220,9 +220,9 @@ void Core::apply(Signal signal, TimePoint now) {
       events_.emplace_back(CycleAborted{});
       break;
     case Effect::TimeOut:
-      fault_alarm_ = step.before == State::Detecting ? Alarm::DetectTimeout
-                     : raised(control::kRobotClear)  ? Alarm::ScanTimeout
-                                                     : Alarm::RobotNotClear;
+      fault_alarm_ = step.before == State::Detecting                                ? Alarm::DetectTimeout
+                     : raised(control::kRobotClear) || !options_.awaits_robot_clear ? Alarm::ScanTimeout
+                                                                                    : Alarm::RobotNotClear;
       events_.emplace_back(CycleTimedOut{});
       [[fallthrough]];
     case Effect::RaiseFault:
@@ -356,6 +356,7 @@ void Core::reconfigure(const Options& options, TimePoint now) {
   options_.base_address = old.base_address;
   options_.word_order = old.word_order;
   options_.pose_convention = old.pose_convention;
+  options_.awaits_robot_clear = old.awaits_robot_clear;
   handshake_.set_timeouts(timeouts_of(options));
   watch_.set_timeout(options.heartbeat_timeout);
   settle(now);

@@ -36,6 +36,7 @@ struct Options {
       3000};  ///< PLC's heartbeat word unchanged for this long: alarm. 0: not watched.
   std::chrono::milliseconds scan_timeout{15000};
   std::chrono::milliseconds detect_timeout{5000};
+  bool awaits_robot_clear = true;       ///< False: the robot carries the scanner, and robot_clear means nothing.
   std::vector<std::uint16_t> part_ids;  ///< Recipes that exist; another id is a result code.
   std::vector<std::uint16_t> supply_ids;
 };

@@ -101,6 +101,7 @@ void UdpLink::open(TimePoint now) {
 void UdpLink::reopen(TimePoint now) { close(now, "closed by us"); }
 
 void UdpLink::close(TimePoint now, const std::string& why) {
+  resolver_.reset();
   if (fd_ >= 0) {
     loop_.forget(fd_);
     ::close(fd_);

@@ -38,6 +38,15 @@ struct Session::Impl {
   std::optional<Path> path;         // that the robot is to run, or runs
   std::uint16_t path_ended_id = 0;  // the last one that came to its end: its report may come twice
 
+  /// With it goes what the robot said of it and nobody has heard yet: it would count for the next one.
+  void forget_path() {
+    path.reset();
+    std::erase_if(events, [](const Event& event) {
+      return std::holds_alternative<PathBegun>(event) || std::holds_alternative<PathEnded>(event) ||
+             std::holds_alternative<PathBroken>(event);
+    });
+  }
+
   Reply reply(Status status) const { return {status, {}, reported_id, outcome}; }
 
   Reply answer(const Request& request) {
@@ -202,7 +211,7 @@ void Session::let_go() {
   if (impl_->path) impl_->path->may_go = true;
 }
 
-void Session::forget_path() { impl_->path.reset(); }
+void Session::forget_path() { impl_->forget_path(); }
 
 void Session::withdraw(NoPick reason) {
   impl_->offered.reset();

@@ -10,7 +10,10 @@ namespace binpick::drivers::sweep {
 /// protocol); where the flange is meanwhile comes from its pose source.
 class RobotCarrier final : public Carrier {
  public:
-  RobotCarrier(robot::Session& robot, robot::PoseSource& poses) : robot_{robot}, poses_{poses} {}
+  /// Scans are numbered from after `last_scan` on: a robot that still has one of an earlier run of the daemon must not
+  /// take it for ours.
+  RobotCarrier(robot::Session& robot, robot::PoseSource& poses, std::uint16_t last_scan = 0)
+      : robot_{robot}, poses_{poses}, scan_{last_scan} {}
   /// A pose is this much older than it says.
   void set_latency(Duration latency) { latency_ = latency; }
 
@@ -33,7 +36,7 @@ class RobotCarrier final : public Carrier {
   robot::PoseSource& poses_;
   Duration latency_{0};
   RobotPath path_;
-  std::uint16_t scan_ = 0;
+  std::uint16_t scan_;
   bool under_way_ = false;
   robot::PoseTrack track_;
 };

@@ -10,6 +10,8 @@ constexpr Duration kDrainMax = std::chrono::milliseconds(300);
 /// the carrier's end. Else it fell silent before, for too short a time to be missed while measuring.
 constexpr Duration kLastProfileAge = std::chrono::milliseconds(50);
 constexpr std::size_t kWaitingMax = 2000;  // 4 s of profiles at the highest rate
+/// Of the profiles of a sweep. What is left out is a strip of the supply that looks empty.
+constexpr double kWithoutPoseMax = 0.1;
 }  // namespace
 
 void Sweep::begin(const Plan& plan, TimePoint now) {
@@ -33,7 +35,8 @@ void Sweep::abort(TimePoint now) { apply(Input::Abort, now); }
 void Sweep::on_carrier(const CarrierNews& news, TimePoint now) {
   switch (news.kind) {
     case CarrierNews::Kind::Moved:
-      return hand_out_profiles();
+      hand_out_profiles();
+      return finish_drained(now);
     case CarrierNews::Kind::Arrived:
       if (state_ == State::Sweeping) move_ended_ = now;
       return apply(state_ == State::Sweeping ? Input::AtEnd : Input::AtStart, now);
@@ -58,8 +61,9 @@ void Sweep::on_scanner(const scanner::Event& event, TimePoint now) {
                    hand_out_profiles();
                  },
                  [&](const scanner::Stopped&) {
+                   scanner_stopped_ = true;
                    hand_out_profiles();
-                   apply(Input::ScannerStopped, now);
+                   finish_drained(now);
                  },
                  [&](const scanner::Failed& failed) {
                    failure_ = {Failed::Device::Scanner, failed.text};
@@ -107,21 +111,14 @@ void Sweep::apply(Input input, TimePoint now) {
       break;
     case Effect::StopScanner:
       deadline_ = now + kDrainMax;
+      scanner_stopped_ = false;  // what it said before is of an earlier sweep
       scanner_.stop_measuring(now);
       break;
     case Effect::Finish:
       deadline_.reset();
       done_.duration = *move_ended_ - *move_began_;
       done_.profiles_lost = scanner_.profiles_lost();
-      done_.profiles_without_pose += waiting_.size();
-      waiting_.clear();
-      if (done_.profiles > 0)
-        events_.emplace_back(done_);
-      else
-        events_.emplace_back(
-            Failed{Failed::Device::Scanner,
-                   "no profile was measured while the scanner was moved; check the latency_ms of scanner "
-                   "and carrier, and that the scanner keeps measuring"});
+      report_end();
       break;
     case Effect::StopAndFail:
     case Effect::StopQuietly:
@@ -131,6 +128,34 @@ void Sweep::apply(Input input, TimePoint now) {
       if (scanner_.state() == scanner::State::Measuring) scanner_.stop_measuring(now);
       if (row->effect == Effect::StopAndFail) events_.emplace_back(failure_);
       break;
+  }
+}
+
+/// The carrier's poses may come later than the scanner's goodbye.
+void Sweep::finish_drained(TimePoint now) {
+  if (state_ == State::Draining && scanner_stopped_ && !waits_for_pose()) apply(Input::ScannerStopped, now);
+}
+
+bool Sweep::waits_for_pose() const {
+  return !waiting_.empty() && waiting_.front().measured_at - plan_.scanner_latency <= *move_ended_;
+}
+
+void Sweep::report_end() {
+  for (; waits_for_pose(); waiting_.pop_front()) ++done_.profiles_without_pose;
+  waiting_.clear();
+  const std::size_t measured = done_.profiles + done_.profiles_without_pose;
+  if (measured == 0) {
+    events_.emplace_back(Failed{Failed::Device::Scanner,
+                                "no profile was measured while the scanner was moved; check the latency_ms of scanner "
+                                "and carrier, and that the scanner keeps measuring"});
+  } else if (static_cast<double>(done_.profiles_without_pose) > kWithoutPoseMax * static_cast<double>(measured)) {
+    events_.emplace_back(Failed{Failed::Device::Poses,
+                                "where the scanner was is not known of " + std::to_string(done_.profiles_without_pose) +
+                                    " of the sweep's " + std::to_string(measured) +
+                                    " profiles; check the network or bus to what carries it, and the latency_ms of "
+                                    "both"});
+  } else {
+    events_.emplace_back(done_);
   }
 }
 

@@ -24,13 +24,18 @@ struct RegisteredProfile {
 };
 /// The carrier stands and the last profile has been handed out.
 struct Done {
-  Duration duration{0};      ///< From the first movement of the sweep proper to its end.
-  std::size_t profiles = 0;  ///< Handed out.
-  std::size_t profiles_without_pose = 0;
-  std::uint64_t profiles_lost = 0;  ///< By the scanner's counter.
+  Duration duration{0};                   ///< From the first movement of the sweep proper to its end.
+  std::size_t profiles = 0;               ///< Handed out.
+  std::size_t profiles_without_pose = 0;  ///< A tenth at most: else the sweep has failed.
+  std::uint64_t profiles_lost = 0;        ///< By the scanner's counter.
 };
 struct Failed {
-  enum class Device { Carrier, Scanner, None } device = Device::None;  ///< None: the sweep took too long.
+  enum class Device {
+    Carrier,
+    Scanner,
+    Poses,  ///< The carrier moved, but where it was is not known.
+    None    ///< The sweep took too long.
+  } device = Device::None;
   std::string text;
 };
 using Event = std::variant<RegisteredProfile, Done, Failed>;
@@ -54,11 +59,15 @@ class Sweep {
  private:
   void apply(Input input, TimePoint now);
   void hand_out_profiles();
+  void finish_drained(TimePoint now);
+  bool waits_for_pose() const;
+  void report_end();
 
   Carrier& carrier_;
   scanner::Scanner& scanner_;
   Plan plan_;
   State state_ = State::Idle;
+  bool scanner_stopped_ = false;
   std::optional<TimePoint> deadline_;
   std::deque<scanner::Profile> waiting_;  // for a pose of the carrier later than themselves
   std::optional<TimePoint> move_began_, move_ended_, last_profile_at_;

@@ -139,6 +139,19 @@ TEST_P(Carried, PosesThatAreLostInAScanAndComeBack) {
   expect_next_pick();
 }
 
+TEST_P(Carried, AScanWithHolesInItsPosesIsNoEmptySupply) {
+  ASSERT_TRUE(runs_on_path(cell));
+  // Each hole is too short for a lost source and too long to guess across.
+  for (int i = 0; i < 5; ++i) {
+    cell.rtde.faults.silent = cell.pose_sender.faults.silent = true;
+    cell.run_for(200ms);
+    cell.rtde.faults.silent = cell.pose_sender.faults.silent = false;
+    cell.run_for(60ms);
+  }
+  expect_fault(plc::Alarm::RobotPosesLost);
+  expect_next_pick();
+}
+
 TEST_P(Carried, WithoutPosesTheCellIsNotReadyAndSaysWho) {
   cell.rtde.faults.unplugged = cell.pose_sender.faults.unplugged = true;
   ASSERT_TRUE(cell.run_until([&] { return !cell.plc.ready(); }));

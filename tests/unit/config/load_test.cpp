@@ -205,6 +205,10 @@ TEST(Load, TheRoleOnThePlcsLineAndItsAddressBelongTogether) {
   EXPECT_EQ(loaded->plc.unit_id, 1);
   EXPECT_EQ(loaded->plc.poll, 50ms);
   EXPECT_EQ(loaded->plc.reply_timeout, 1000ms);
+  folder.edit("poll_ms = 50", "poll_ms = 1000").edit("heartbeat_timeout_ms = 3000", "heartbeat_timeout_ms = 1500");
+  EXPECT_EQ(folder.findings(), std::to_string(folder.line_of("poll_ms = ")) +
+                                   ":11: plc.heartbeat_timeout_ms = 1500 is less than two polls of 1000 ms, the PLC "
+                                   "would be taken for lost between them; poll more often, or use at least 2000\n");
 }
 
 struct Mistake {

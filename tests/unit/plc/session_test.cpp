@@ -417,6 +417,17 @@ TEST(Session, ScanAndDetectionHaveTheirTimes) {
   }
 }
 
+TEST(Session, WhereTheRobotCarriesTheScannerNobodyIsSentToMoveItOutOfTheView) {
+  Options o = test::options();
+  o.awaits_robot_clear = false;
+  Rig rig{o};
+  rig.bring_to(State::Scanning);
+  rig.control(0);
+  rig.run_for(o.scan_timeout);
+  EXPECT_EQ(rig.session.state(), State::Fault);
+  EXPECT_EQ(rig.first_alarm(), Alarm::ScanTimeout);
+}
+
 TEST(Session, AResultNeverExpires) {
   Rig rig;
   rig.bring_to(State::ResultValid);

@@ -68,6 +68,19 @@ TEST_P(ScanPath, WhatIsNotWantedAnyMoreIsSaid) {
   EXPECT_EQ(events(), "");
 }
 
+TEST_P(ScanPath, WhatWasSaidOfAForgottenOneDoesNotCountForTheNext) {
+  session.ask_path(7, 1);
+  session.let_go();
+  EXPECT_EQ(status_of("begin 7"), Status::Go);
+  EXPECT_EQ(status_of("end 7"), Status::ReportTaken);
+  session.forget_path();  // an abort, heard before the robot's words
+  session.ask_path(8, 1);
+  EXPECT_EQ(events(), "");
+  EXPECT_EQ(status_of("end 7"), Status::ReportTaken) << "its answer was lost, say";
+  EXPECT_EQ(status_of("begin 8"), Status::NotReady);
+  EXPECT_EQ(events(), "begun ");
+}
+
 TEST_P(ScanPath, BrokenOffOrEndedBeforeItWasLetGoIsNoScan) {
   session.ask_path(7, 1);
   session.let_go();
@@ -100,7 +113,8 @@ TEST_P(ScanPath, AnOfferedPickWaitsUntilTheScanIsOver) {
 
 TEST(ScanPathLines, AreReadAndRefusedLikeTheOthers) {
   using Kind = Request::Kind;
-  for (const auto& [line, kind] : {std::pair{"begin 4", Kind::Begin}, {"end 65535", Kind::End}, {"broken 1", Kind::Broken}}) {
+  for (const auto& [line, kind] :
+       {std::pair{"begin 4", Kind::Begin}, {"end 65535", Kind::End}, {"broken 1", Kind::Broken}}) {
     const auto request = decode_request(line);
     ASSERT_TRUE(request) << line;
     EXPECT_EQ(request->kind, kind);
@@ -111,6 +125,5 @@ TEST(ScanPathLines, AreReadAndRefusedLikeTheOthers) {
     EXPECT_FALSE(decode_request(line)) << line;
 }
 
-INSTANTIATE_TEST_SUITE_P(Makes, ScanPath,
-                         testing::Values(Dialect::UniversalRobots, Dialect::Fanuc, Dialect::Kawasaki));
+INSTANTIATE_TEST_SUITE_P(Makes, ScanPath, testing::Values(Dialect::UniversalRobots, Dialect::Fanuc, Dialect::Kawasaki));
 }  // namespace binpick::drivers::robot
