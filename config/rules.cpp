@@ -126,6 +126,12 @@ void check_robot_carrier(const Config& c, const CellPlaces& at, Findings& findin
     findings.add(at.of("robot", "pose_listen"),
                  "robot.pose_listen is missing, but the robot carries the scanner; add, for example: pose_listen = "
                  "\"0.0.0.0:5003\"");
+  if (is_ur && !c.pose_listen.empty())
+    findings.add(at.of("robot", "pose_listen"),
+                 "robot.pose_listen is for dialect fanuc and kawasaki; remove it, ur has pose_address");
+  if (!is_ur && !c.pose_address.empty())
+    findings.add(at.of("robot", "pose_address"),
+                 "robot.pose_address is for dialect ur; remove it, others have pose_listen");
   if (!c.pose_listen.empty() && port_of(c.pose_listen) != "0" &&
       (port_of(c.pose_listen) == port_of(c.robot_listen) || port_of(c.pose_listen) == port_of(c.plc_listen)))
     findings.add(at.of("robot", "pose_listen"), "robot.pose_listen has the port of another socket of the cell, " +

@@ -132,11 +132,21 @@ void Links::open_plc(link::Loop& loop) {
     plc_server_.emplace(loop, endpoint(config.plc_listen, "plc.listen"), plc_peer(cell_));
 }
 
+/// Attempts fail alike: told when the reason changes. What a session closed it has told itself.
+void Links::tell(const char* device, const std::string& address, const std::string& error, std::string& told) {
+  if (std::exchange(told, error) == error || error.empty() || error == drivers::link::kClosedByUs) return;
+  BINPICK_LOG(Warning, device, "no connection to %s: %s; check the address in the cell file, power and cable",
+              address.c_str(), error.c_str());
+}
+
 void Links::on_deadline(TimePoint now) {
   const auto due = [&](std::optional<TimePoint> at) { return at && *at <= now; };
   if (pivot_ && due(pivot_->deadline())) pivot_->on_deadline(now);
   if (pose_client_ && due(pose_client_->deadline())) pose_client_->on_deadline(now);
   if (due(scanner_->deadline())) scanner_->on_deadline(now);
+  const auto& config = cell_.data().config;
+  tell("scanner", config.scanner_address, scanner_->last_error(), scanner_trouble_);
+  if (pose_client_) tell("robot", config.pose_address, pose_client_->last_error(), pose_trouble_);
   if (!plc_client_) return;
   if (due(plc_client_->deadline())) plc_client_->on_deadline(now);
   // Attempts fail alike: told when the reason changes. Why an open connection ended, the session tells.

@@ -28,6 +28,7 @@ class Links {
                                       std::function<void(TimePoint)> on_disconnected,
                                       std::function<Bytes()> take_output);
   void open_poses(drivers::link::Loop& loop);
+  static void tell(const char* device, const std::string& address, const std::string& error, std::string& told);
   void open_plc(drivers::link::Loop& loop);
 
   Cell& cell_;
@@ -42,5 +43,6 @@ class Links {
   std::optional<drivers::link::TcpClient> pose_client_;  // one of the two, where the robot carries the scanner
   std::optional<drivers::link::TcpServer> pose_server_;
   drivers::link::ConnectionId pose_connection_ = 0;
+  std::string scanner_trouble_, pose_trouble_;  // why not, as last told
 };
 }  // namespace binpick::daemon

@@ -6,6 +6,9 @@
 #include "base/clock.hpp"
 
 namespace binpick::drivers::link {
+/// last_error() after reopen(): nothing has failed.
+inline constexpr const char* kClosedByUs = "closed by us";
+
 /// Our end of the way to one device, TCP or UDP. Opens by itself, again and again; what comes goes to the session whose
 /// face it was given.
 class DeviceLink {

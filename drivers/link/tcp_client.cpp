@@ -113,7 +113,7 @@ void TcpClient::drop(TimePoint now, const std::string& why) {
 
 void TcpClient::reopen(TimePoint now) {
   retry_ = options_.retry_first;
-  drop(now, "closed by us");
+  drop(now, kClosedByUs);
 }
 
 void TcpClient::on_event(std::uint32_t events, TimePoint now) {

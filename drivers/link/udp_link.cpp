@@ -73,13 +73,17 @@ void UdpLink::on_deadline(TimePoint now) {
     remote_ = numeric->front();
     return open(now);
   }
-  resolver_ = std::make_unique<Resolver>(loop_, endpoint_.host, endpoint_.port, [this](TimePoint at) {
-    const auto addresses = resolver_->take_result();
-    resolver_.reset();
-    if (!addresses || addresses->empty()) return close(at, addresses ? "host has no address" : addresses.error());
-    remote_ = addresses->front();
-    open(at);
-  });
+  try {
+    resolver_ = std::make_unique<Resolver>(loop_, endpoint_.host, endpoint_.port, [this](TimePoint at) {
+      const auto addresses = resolver_->take_result();
+      resolver_.reset();
+      if (!addresses || addresses->empty()) return close(at, addresses ? "host has no address" : addresses.error());
+      remote_ = addresses->front();
+      open(at);
+    });
+  } catch (const std::system_error& error) {  // out of descriptors or threads: later, perhaps
+    close(now, error.what());
+  }
 }
 
 void UdpLink::open(TimePoint now) {
@@ -98,7 +102,7 @@ void UdpLink::open(TimePoint now) {
   flush(now);
 }
 
-void UdpLink::reopen(TimePoint now) { close(now, "closed by us"); }
+void UdpLink::reopen(TimePoint now) { close(now, kClosedByUs); }
 
 void UdpLink::close(TimePoint now, const std::string& why) {
   resolver_.reset();

@@ -123,6 +123,8 @@ TEST(Load, WhatARobotThatCarriesTheScannerNeedsIsAskedFor) {
   expect("T_flange_scanner = { xyz_mm = [0, 80, 120], rpy_deg = [0, 0, 0] }", "",
          "scanner.T_flange_scanner is missing in [scanner]");
   expect("dialect = \"ur\"", "dialect = \"kawasaki\"", "robot.pose_listen is missing");
+  expect("dialect = \"ur\"", "dialect = \"kawasaki\"", "robot.pose_address is for dialect ur; remove it");
+  expect("pose_address =", "pose_listen = \"0.0.0.0:5003\"\npose_address =", "robot.pose_listen is for dialect fanuc");
   expect("T_base_supply", "path_timeout_ms = 15000\nT_base_supply", "supply.path_timeout_ms = 15000 is not less than");
   expect("T_base_supply", "sweep_end_deg = 16\nT_base_supply",
          "supply.sweep_end_deg is for scanner.carrier = pivot only; remove it");
