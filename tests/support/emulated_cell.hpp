@@ -67,7 +67,7 @@ class EmulatedCell {
   const vision::DepthImage& last_image() const { return last_image_; }  ///< Of the last sweep.
   /// Real time that the cell took from seeing a request to having its sweep begun, of each.
   const std::vector<Duration>& took_up() const { return took_up_; }
-  std::uint64_t sweeps() const { return sweeps_; }                      ///< Detect requests that the cell made.
+  std::uint64_t sweeps() const { return sweeps_; }  ///< Detect requests that the cell made.
   const std::vector<daemon::DetectResult>& results() const { return results_; }  ///< Of all detections, oldest first.
 
  private:
