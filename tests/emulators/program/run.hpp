@@ -19,8 +19,8 @@ struct RunOptions {
   std::set<Device> devices;  ///< That are played here; the others are real, or played elsewhere.
   BinOptions bin;
   std::optional<drivers::pivot::Protocol> pivot;  ///< None: what the cell file says.
-  int cycles = 0;           ///< Picks until the end; 0: until told to quit.
-  double tolerance_mm = 5;  ///< A pick that is further off makes the run fail.
+  int cycles = 0;                                 ///< Picks until the end; 0: until told to quit.
+  double tolerance_mm = 5;                        ///< A pick that is further off makes the run fail.
   double tolerance_deg = 3;
   Duration timeout = Duration::max();
   Duration pick_time{std::chrono::seconds(8)};  ///< Without the emulated robot: the PLC lets a real one work this long.
