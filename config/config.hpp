@@ -15,6 +15,7 @@
 #include "plc/session.hpp"
 #include "vision/detector.hpp"
 #include "vision/grasp.hpp"
+#include "vision/gripper.hpp"
 #include "vision/knowledge_base.hpp"
 #include "vision/registration.hpp"
 
@@ -41,6 +42,7 @@ struct Part {
   double mesh_unit_mm = 1;
   vision::PartOptions options;
   std::vector<vision::Grasp> grasps;
+  std::optional<vision::Gripper> gripper;  ///< Nothing: only the tcp itself is kept clear of the walls.
 };
 
 /// One [[part]] entry of the cell file.

@@ -13,6 +13,13 @@ struct Grasp {
   std::string name;
   Transform<frame::Object, frame::Tcp> T_object_tcp;
   double approach_mm = 100;  ///< The approach pose stands this far back along tcp z.
+  /// Between the jaws on the way in; the gripper's widest where it is not said.
+  std::optional<double> opening_mm;
+  /// Between the jaws when they hold the part. Wider than on the way in: they hold it from within, in a bore.
+  std::optional<double> holding_mm;
+  double retreat_mm =
+      0;  ///< Straight up from the approach pose, the way in and out is free so far. 0: out of the supply.
+  double preference = 0;  ///< Of grasps that are equal otherwise, the one with the higher value.
 };
 
 struct ReachLimits {
