@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "base/clock.hpp"
-#include "daemon/cell_data.hpp"
-#include "daemon/detection.hpp"
+#include "daemon/cycle/cell_data.hpp"
+#include "daemon/cycle/detection.hpp"
 #include "daemon/sequence.hpp"
 #include "drivers/pivot/session.hpp"
 #include "drivers/robot/session.hpp"

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "base/expected.hpp"
-#include "daemon/cell_data.hpp"
+#include "daemon/cycle/cell_data.hpp"
 #include "daemon/mailbox.hpp"
 
 namespace binpick::daemon {

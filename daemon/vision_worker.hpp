@@ -5,7 +5,7 @@
 #include <thread>
 
 #include "base/clock.hpp"
-#include "daemon/detection.hpp"
+#include "daemon/cycle/detection.hpp"
 #include "daemon/mailbox.hpp"
 
 namespace binpick::daemon {

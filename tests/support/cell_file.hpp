@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/cell_data.hpp"
+#include "daemon/cycle/cell_data.hpp"
 
 namespace binpick::support {
 /// What tests vary in a cell file; the rest is one cell: an LMS 400 over a lattice box, or an LPS 36 over a small box.

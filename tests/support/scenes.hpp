@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <string>
 
-#include "daemon/cell_data.hpp"
+#include "daemon/cycle/cell_data.hpp"
 #include "drivers/robot/session.hpp"
 #include "tests/emulators/world/world.hpp"
 #include "vision/knowledge_base.hpp"

@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "daemon/cell_data.hpp"
+#include "daemon/cycle/cell_data.hpp"
 #include "vision/depth_image.hpp"
 #include "vision/detector.hpp"
 #include "vision/fill_level.hpp"

@@ -1,4 +1,4 @@
-#include "daemon/detection.hpp"
+#include "daemon/cycle/detection.hpp"
 
 #include <algorithm>
 #include <exception>

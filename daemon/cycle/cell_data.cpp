@@ -1,4 +1,4 @@
-#include "daemon/cell_data.hpp"
+#include "daemon/cycle/cell_data.hpp"
 
 #include <filesystem>
 
