@@ -289,6 +289,24 @@ const std::vector<Section<Config>>& cell_sections() {
            {{.name = "wall_clearance_mm", .type = Number, .unit = "mm", .max = 1000, .default_value = "0",
              .help = "The tcp stays this far inside the supply's walls."},
             [](C& c) -> Slot { return &c.reach.wall_clearance_mm; }},
+           {{.name = "clearance_mm", .type = Number, .unit = "mm", .max = 1000, .sample = "3",
+             .help = "Gripper and held part stay this far from walls, floor and all that was measured. Default: twice "
+                     "the noise of the part's scanner class."},
+            [](C& c) -> Slot { return &c.reach.clearance_mm; }},
+           {{.name = "unmeasured", .type = Choice, .default_value = "\"blocked\"", .choices = {"free", "blocked"},
+             .help = "What stands where the scanner saw nothing: nothing, or something as high as the highest that was "
+                     "measured around that place."},
+            [](C& c) -> Slot {
+              using enum vision::Unmeasured;
+              return chosen(c.reach.unmeasured, {Free, Blocked});
+            }},
+           {{.name = "radius_max_mm", .type = Number, .unit = "mm", .max = 20000, .default_value = "0",
+             .help = "The tcp stays within this distance of the origin of the robot's base, at the grasp and at the "
+                     "approach pose; 0: no limit."},
+            [](C& c) -> Slot { return &c.reach.radius_max_mm; }},
+           {{.name = "axis_min_mm", .type = Number, .unit = "mm", .max = 20000, .default_value = "0",
+             .help = "And this far from the z axis of the robot's base."},
+            [](C& c) -> Slot { return &c.reach.axis_min_mm; }},
        }},
       {"detection",
        "Finding the objects.",

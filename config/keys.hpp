@@ -92,6 +92,13 @@ struct SymmetryEntry {
   Eigen::Vector3d flip_axis = Eigen::Vector3d::UnitX();
   Eigen::Vector3d centre_mm = Eigen::Vector3d::Zero();
 };
+/// [gripper] of a PART.toml, and one [[gripper_body]].
+struct GripperEntry {
+  vision::Gripper::Jaws jaws;
+};
+struct GripperBodyEntry {
+  vision::Gripper::Solid solid;
+};
 
 const std::vector<Section<Config>>& cell_sections();
 const Section<Supply>& supply_section();       ///< [[supply]] of a cell file.
@@ -99,6 +106,8 @@ const Section<RecipeEntry>& recipe_section();  ///< [[part]] of a cell file.
 const Section<Part>& part_section();           ///< Head of a PART.toml.
 const Section<SymmetryEntry>& symmetry_section();
 const Section<vision::Grasp>& grasp_section();  ///< [[grasp]] of a PART.toml.
+const Section<GripperEntry>& gripper_section();
+const Section<GripperBodyEntry>& gripper_body_section();
 
 /// A slot's value as text, to tell whether two are the same.
 std::string text_of(const Slot& slot);

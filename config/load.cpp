@@ -84,7 +84,8 @@ std::vector<Diagnostic> read_part(Document document, Part& part) {
   part.path = document.file;
   Findings findings{document.file, document.lines};
   const ReadContext context{findings, document.damaged_keys};
-  const Places head = read_section(document.root, part_section(), part, context, {"grasp", "symmetry"});
+  const Places head =
+      read_section(document.root, part_section(), part, context, {"grasp", "gripper", "gripper_body", "symmetry"});
   if (part.options.name.empty()) part.options.name = fs::path{document.file}.stem().string();
   if (head.given("mesh")) {
     part.mesh_path = resolved(document.file, part.mesh_path);
@@ -93,12 +94,27 @@ std::vector<Diagnostic> read_part(Document document, Part& part) {
       findings.add(head.of("mesh"), "mesh: there is no file " + printable(part.mesh_path) +
                                         "; give its path from the folder of this file");
   }
+  GripPlaces grips;
+  if (const Member* member = document.root.find("gripper"))
+    if (const Value* table = as_section(*member, findings)) {
+      GripperEntry entry;
+      grips.gripper = read_section(*table, gripper_section(), entry, context);
+      part.gripper.emplace().jaws = entry.jaws;
+    }
+  if (const Member* member = document.root.find("gripper_body"))
+    for (const Value* entry : as_entries(*member, findings)) {
+      GripperBodyEntry body;
+      grips.bodies.push_back(read_section(*entry, gripper_body_section(), body, context, {}, true));
+      if (!part.gripper) part.gripper.emplace();
+      part.gripper->body.push_back(body.solid);
+    }
   if (const Member* member = document.root.find("grasp"))
     for (const Value* entry : as_entries(*member, findings)) {
       vision::Grasp grasp;
-      read_section(*entry, grasp_section(), grasp, context, {}, true);
+      grips.grasps.push_back(read_section(*entry, grasp_section(), grasp, context, {}, true));
       part.grasps.push_back(grasp);
     }
+  check_grips(part, grips, findings);
   if (const Member* member = document.root.find("symmetry"))
     if (const Value* table = as_section(*member, findings)) {
       SymmetryEntry entry;

@@ -98,13 +98,76 @@ const Section<vision::Grasp>& grasp_section() {
             .help = "For the log."},
            [](G& g) -> Slot { return &g.name; }},
           {{.name = "T_object_tcp", .type = Transform, .required = true,
-            .example = "{ xyz_mm = [0, 0, 25], rpy_deg = [180, 0, 0] }",
+            .example = "{ xyz_mm = [0, 0, 25], rpy_deg = [180, 0, 90] }",
             .help = "The tcp when the part is taken, in the mesh's frame. Its z axis points out of the tool, into "
-                    "the part."},
+                    "the part; the jaws move along its x axis."},
            [](G& g) -> Slot { return &g.T_object_tcp.iso; }},
           {{.name = "approach_mm", .type = Number, .unit = "mm", .min = 0, .max = 2000, .default_value = "100",
             .help = "The approach pose stands this far back along the tcp's z axis."},
            [](G& g) -> Slot { return &g.approach_mm; }},
+          {{.name = "opening_mm", .type = Number, .unit = "mm", .min = 0, .max = 5000, .sample = "140",
+            .help = "Between the inner faces of the jaws on the way in. Default: gripper.opening_max_mm."},
+           [](G& g) -> Slot { return &g.opening_mm; }},
+          {{.name = "holding_mm", .type = Number, .unit = "mm", .min = 0, .max = 5000, .example = "120",
+            .help = "The same when they hold the part; needed where the gripper has jaws. More than on the way in: they "
+                    "hold it from within, in a bore."},
+           [](G& g) -> Slot { return &g.holding_mm; }},
+          {{.name = "retreat_mm", .type = Number, .unit = "mm", .min = 0, .max = 5000, .default_value = "0",
+            .help = "The robot comes straight down to the approach pose and leaves it straight up; so far above it the "
+                    "way has to be free. 0: from above the walls, and all that was measured."},
+           [](G& g) -> Slot { return &g.retreat_mm; }},
+          {{.name = "preference", .type = Number, .min = -100, .max = 100, .default_value = "0",
+            .help = "Of the grasps of one object that are free, one with the highest value is taken; 0 for most."},
+           [](G& g) -> Slot { return &g.preference; }},
+      }};
+  return section;
+}
+
+const Section<GripperEntry>& gripper_section() {
+  using enum Type;
+  using G = GripperEntry;
+  static const Section<GripperEntry> section = {
+      "gripper",
+      "The two jaws that take the part, so that they are kept clear of all else. Without this section it is a gripper "
+      "without jaws (magnet, suction cup).",
+      {
+          {{.name = "opening_max_mm", .type = Number, .unit = "mm", .min = 0.1, .max = 5000, .required = true,
+            .example = "140",
+            .help = "Between the inner faces of the jaws when it is open."},
+           [](G& g) -> Slot { return &g.jaws.opening_max_mm; }},
+          {{.name = "jaw_size_mm", .type = Vector, .unit = "mm", .min = 0.1, .max = 2000, .required = true,
+            .example = "[12, 40, 80]",
+            .help = "Of one jaw in the tcp's frame: thickness along x, the way it moves; width along y; length along z."},
+           [](G& g) -> Slot { return &g.jaws.size_mm; }},
+          {{.name = "beyond_mm", .type = Number, .unit = "mm", .min = -1000, .max = 1000, .default_value = "0",
+            .example = "20",
+            .help = "The tips of the jaws stand this far beyond the tcp."},
+           [](G& g) -> Slot { return &g.jaws.beyond_mm; }},
+      }};
+  return section;
+}
+
+const Section<GripperBodyEntry>& gripper_body_section() {
+  using enum Type;
+  using B = GripperBodyEntry;
+  static const Section<GripperBodyEntry> section = {
+      "gripper_body",
+      "What else moves with the tcp: palm, hoses, a camera, the arm's last axis. One entry for each box or cylinder.",
+      {
+          {{.name = "shape", .type = Choice, .required = true, .example = "\"box\"", .choices = {"box", "cylinder"},
+            .help = "A cylinder's axis is z."},
+           [](B& b) -> Slot {
+             return Chosen{[&b](std::size_t i) { b.solid.shape = static_cast<vision::Gripper::Solid::Shape>(i); },
+                           [&b] { return static_cast<std::size_t>(b.solid.shape); }};
+           }},
+          {{.name = "size_mm", .type = Vector, .unit = "mm", .min = 0.1, .max = 5000, .required = true,
+            .example = "[170, 90, 120]",
+            .help = "A box's edges along x, y and z; of a cylinder diameter, diameter, length."},
+           [](B& b) -> Slot { return &b.solid.size_mm; }},
+          {{.name = "T_tcp_solid", .type = Transform, .required = true,
+            .example = "{ xyz_mm = [0, 0, -120], rpy_deg = [0, 0, 0] }",
+            .help = "Its middle and directions in the tcp's frame, whose z axis points out of the tool."},
+           [](B& b) -> Slot { return &b.solid.T_tcp_solid; }},
       }};
   return section;
 }

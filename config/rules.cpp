@@ -212,6 +212,14 @@ void check_views(const Config& c, const CellPlaces& at, Findings& findings) {
   }
 }
 
+void check_reach(const Config& c, const CellPlaces& at, Findings& findings) {
+  if (c.reach.radius_max_mm > 0 && c.reach.axis_min_mm >= c.reach.radius_max_mm)
+    findings.add(at.of("reach", at.given("reach", "radius_max_mm") ? "radius_max_mm" : "axis_min_mm"),
+                 "reach.radius_max_mm = " + rounded(c.reach.radius_max_mm) +
+                     " leaves nothing outside of reach.axis_min_mm = " + rounded(c.reach.axis_min_mm) +
+                     "; use more, or 0 for no limit");
+}
+
 template <class Entry>
 void check_ids(const std::vector<Entry>& entries, const std::vector<Places>& places, const std::string& section,
                Findings& findings) {
@@ -251,53 +259,8 @@ void check_rules(const Config& config, const CellPlaces& places, Findings& findi
   check_robot_carrier(config, places, findings);
   check_sweeps(config, places, findings);
   check_views(config, places, findings);
+  check_reach(config, places, findings);
   check_ids(config.supplies, places.supplies, "supply", findings);
   check_ids(config.recipes, places.parts, "part", findings);
-}
-
-bool make_symmetry(const SymmetryEntry& entry, const Places& places, Findings& findings, vision::Symmetry& symmetry) {
-  enum Kind : std::size_t { kNone, kCyclic, kDihedral, kRevolution, kRevolutionFlip, kSphere };  // order of the choices
-  if (entry.axis.norm() < 1e-6) {
-    findings.add(places.of("axis"), "symmetry.axis is zero; use, for example, [0, 0, 1]");
-    return false;
-  }
-  const Eigen::Vector3d axis = entry.axis.normalized();
-  symmetry = {};
-  symmetry.axis = axis;
-  switch (entry.kind) {
-    case kNone:
-      break;
-    case kRevolution:
-      symmetry.kind = vision::Symmetry::Kind::Revolution;
-      break;
-    case kRevolutionFlip:
-      symmetry.kind = vision::Symmetry::Kind::RevolutionFlip;
-      break;
-    case kSphere:
-      symmetry.kind = vision::Symmetry::Kind::Sphere;
-      break;
-    default: {
-      const bool flips = entry.kind == kDihedral;
-      const double tilt = flips && entry.flip_axis.norm() > 1e-6 ? std::abs(axis.dot(entry.flip_axis.normalized()))
-                          : flips                                ? 1.0
-                                                                 : 0.0;
-      if (tilt > 0.01) {
-        findings.add(places.of(places.given("flip_axis") ? "flip_axis" : "kind"),
-                     "symmetry.flip_axis is not at right angles to symmetry.axis; use one that is");
-        return false;
-      }
-      symmetry.kind = vision::Symmetry::Kind::Finite;
-      symmetry.rotations.clear();
-      for (int flip = 0; flip <= (flips ? 1 : 0); ++flip)
-        for (int turn = 0; turn < entry.fold; ++turn) {
-          Eigen::Matrix3d rotation =
-              Eigen::AngleAxisd(2 * std::numbers::pi * turn / entry.fold, axis).toRotationMatrix();
-          if (flip == 1) rotation = rotation * Eigen::AngleAxisd(std::numbers::pi, entry.flip_axis.normalized());
-          symmetry.rotations.push_back(turn == 0 && flip == 0 ? Eigen::Matrix3d::Identity() : rotation);
-        }
-      if (symmetry.rotations.size() == 1) symmetry.kind = vision::Symmetry::Kind::None;
-    }
-  }
-  return true;
 }
 }  // namespace binpick::config

@@ -25,6 +25,15 @@ struct CellPlaces {
 std::optional<bool> is_for(const KeyFacts& facts, Config config, const CellPlaces& at);
 /// Values that were bad hold their default while this runs, so that one mistake is not told twice.
 void check_rules(const Config& config, const CellPlaces& places, Findings& findings);
+
+/// Where [gripper], [[gripper_body]] and [[grasp]] of a part file stand, in the order of the part's own.
+struct GripPlaces {
+  std::optional<Places> gripper;
+  std::vector<Places> bodies;
+  std::vector<Places> grasps;
+};
+/// Rules across the grasps of a part and its gripper.
+void check_grips(const Part& part, const GripPlaces& places, Findings& findings);
 /// Makes the group that [symmetry] describes; false with a finding when it describes none.
 bool make_symmetry(const SymmetryEntry& entry, const Places& places, Findings& findings, vision::Symmetry& symmetry);
 }  // namespace binpick::config

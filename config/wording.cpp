@@ -167,6 +167,8 @@ std::string example_part() {
       "# A part, for `binpick train`. Paths are relative to this file's folder.\n"
       "# Written by config_docs from the table of keys (config/part_keys.cpp).\n\n";
   text += example_of(part_section(), false);
+  text += "\n" + example_of(gripper_section(), false);
+  text += "\n" + example_of(gripper_body_section(), true);
   text += "\n" + example_of(grasp_section(), true);
   std::string symmetry = example_of(symmetry_section(), false);
   // Found from the mesh when absent, so the example has it as a comment.
@@ -219,6 +221,7 @@ the fixed axes x, then y, then z, in degrees. `T_a_b` maps coordinates in b to c
 - Where the robot carries the scanner, `robot.listen` and `robot.pose_address` (ur) or `robot.pose_listen` (fanuc, kawasaki)
   are given, and `supply.path_timeout_ms` is less than `plc.scan_timeout_ms` and `robot.silence_max_s`.
 - In the middle of a sweep the scanner's middle ray goes down into the supply, or at most half its size beside it.
+- `reach.radius_max_mm` is 0 or more than `reach.axis_min_mm`.
 - Ids differ among supplies and among parts.
 - Part files and their meshes exist; a part that is picked has at least one grasp.
 
@@ -226,9 +229,16 @@ the fixed axes x, then y, then z, in degrees. `T_a_b` maps coordinates in b to c
 
 )";
   text += part_table_of(part_section(), "Head");
+  text += part_table_of(gripper_section(), "[gripper]");
+  text += part_table_of(gripper_body_section(), "[[gripper_body]]");
   text += part_table_of(grasp_section(), "[[grasp]]");
   text += part_table_of(symmetry_section(), "[symmetry]");
-  while (text.ends_with("\n\n")) text.pop_back();
+  text += R"(Rules across keys:
+
+- Where there is `[gripper]`, each grasp has `holding_mm`; `opening_mm` and `holding_mm` are at most
+  `gripper.opening_max_mm`, and differ. Without it a grasp has neither.
+- The first two of `gripper_body.size_mm` are the same for a cylinder.
+)";
   return text;
 }
 }  // namespace binpick::config

@@ -17,14 +17,25 @@ struct Grasp {
   std::optional<double> opening_mm;
   /// Between the jaws when they hold the part. Wider than on the way in: they hold it from within, in a bore.
   std::optional<double> holding_mm;
-  double retreat_mm =
-      0;  ///< Straight up from the approach pose, the way in and out is free so far. 0: out of the supply.
-  double preference = 0;  ///< Of grasps that are equal otherwise, the one with the higher value.
+  /// Straight up from the approach pose, the way in and out is free so far. 0: out of the supply.
+  double retreat_mm = 0;
+  double preference = 0;  ///< Of an object's grasps that are free, one with the highest value is taken.
+};
+
+/// What stands where nothing was measured.
+enum class Unmeasured {
+  Free,     ///< Nothing.
+  Blocked,  ///< Something as high as the highest that was measured at the border of that hole.
 };
 
 struct ReachLimits {
   double tilt_max_rad = 0.7;     ///< Between tcp z and straight down (-z of the supply).
   double wall_clearance_mm = 0;  ///< The tcp stays this far inside the supply's walls.
+  /// Gripper and held part stay this far from walls, floor and all that was measured; twice the noise if absent.
+  std::optional<double> clearance_mm = std::nullopt;
+  Unmeasured unmeasured = Unmeasured::Blocked;
+  double radius_max_mm = 0;  ///< Of the tcp from the origin of the robot's base; 0: no limit.
+  double axis_min_mm = 0;    ///< Of the tcp from the z axis of the robot's base.
 };
 
 /// Probability that a detection is right and lies so near to the truth that a grasp holds: its score, times what its

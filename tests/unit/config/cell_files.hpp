@@ -71,16 +71,8 @@ class CellFolder {
     return text;
   }
   /// The line of the cell file that begins with `start`.
-  int line_of(const std::string& start) const {
-    int line = 1;
-    for (std::size_t at = 0; at < cell.size(); ++line) {
-      if (cell.compare(at, start.size(), start) == 0) return line;
-      at = cell.find('\n', at);
-      if (at == std::string::npos) break;
-      ++at;
-    }
-    throw std::runtime_error("no line begins with " + start);
-  }
+  int line_of(const std::string& start) const { return line_of(cell, start); }
+  std::string part_line_of(const std::string& start) const { return std::to_string(line_of(part, start)); }
 
   std::string cell;
   std::string part;
@@ -90,6 +82,17 @@ class CellFolder {
     const std::size_t at = text.find(from);
     if (at == std::string::npos) throw std::runtime_error("nothing to replace: " + from);
     text.replace(at, from.size(), to);
+  }
+
+  static int line_of(const std::string& text, const std::string& start) {
+    int line = 1;
+    for (std::size_t at = 0; at < text.size(); ++line) {
+      if (text.compare(at, start.size(), start) == 0) return line;
+      at = text.find('\n', at);
+      if (at == std::string::npos) break;
+      ++at;
+    }
+    throw std::runtime_error("no line begins with " + start);
   }
 
   std::string folder_;

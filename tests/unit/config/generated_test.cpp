@@ -50,5 +50,7 @@ TEST(Generated, TheTableIsWhole) {
   expect_told(part_section());
   expect_told(symmetry_section());
   expect_told(grasp_section());
+  expect_told(gripper_section());
+  expect_told(gripper_body_section());
 }
 }  // namespace binpick::config

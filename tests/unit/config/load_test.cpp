@@ -361,6 +361,16 @@ TEST(Load, APivotThatWouldHaltBetweenSetPointsIsRefused) {
                 "would halt between set-points; use at least 120\n");
 }
 
+TEST(Load, ARadiusWithinTheOneToKeepOutOfIsRefused) {
+  CellFolder folder;
+  folder.edit("axis_min_mm = 0", "axis_min_mm = 300");
+  EXPECT_EQ(folder.findings(), "");
+  folder.edit("radius_max_mm = 0", "radius_max_mm = 250");
+  EXPECT_EQ(folder.findings(), std::to_string(folder.line_of("radius_max_mm")) +
+                                   ":17: reach.radius_max_mm = 250 leaves nothing outside of reach.axis_min_mm = 300; "
+                                   "use more, or 0 for no limit\n");
+}
+
 TEST(Load, EntriesThatAreMissingAreSaidAtTheEndOfTheFile) {
   CellFolder folder;
   folder.cell = "[cell]\nname = \"empty\"\n";
@@ -394,9 +404,107 @@ TEST(Part, FindingsNameThePartFile) {
   CellFolder folder;
   folder.edit_part("mesh = \"track_link.stl\"", "mesh = \"gone.stl\"")
       .edit_part("approach_mm = 100", "aproach_mm = 100");
-  EXPECT_EQ(folder.findings(),
-            "track_link.toml:7:8: mesh: there is no file gone.stl; give its path from the folder of this file\n"
-            "track_link.toml:43:1: unknown key \"aproach_mm\" in [[grasp]]; did you mean \"approach_mm\"?\n");
+  EXPECT_EQ(
+      folder.findings(),
+      std::string{"track_link.toml:7:8: mesh: there is no file gone.stl; give its path from the folder of this file\n"
+                  "track_link.toml:"} +
+          folder.part_line_of("aproach_mm") +
+          ":1: unknown key \"aproach_mm\" in [[grasp]]; did you mean \"approach_mm\"?\n");
+}
+
+TEST(Part, TheExampleHasAGripperAndAGraspForIt) {
+  const CellFolder folder;
+  const auto loaded = folder.load();
+  ASSERT_TRUE(loaded.has_value()) << folder.findings();
+  const Part& part = loaded->recipes[0].part;
+  ASSERT_TRUE(part.gripper && part.gripper->jaws);
+  EXPECT_EQ(part.gripper->jaws->opening_max_mm, 140);
+  EXPECT_EQ(part.gripper->jaws->size_mm, Eigen::Vector3d(12, 40, 80));
+  EXPECT_EQ(part.gripper->jaws->beyond_mm, 20);
+  ASSERT_EQ(part.gripper->body.size(), 1U);
+  EXPECT_EQ(part.gripper->body[0].shape, vision::Gripper::Solid::Shape::Box);
+  EXPECT_EQ(part.gripper->body[0].size_mm, Eigen::Vector3d(170, 90, 120));
+  EXPECT_EQ(part.gripper->body[0].T_tcp_solid.translation(), Eigen::Vector3d(0, 0, -120));
+  ASSERT_EQ(part.grasps.size(), 1U);
+  EXPECT_FALSE(part.grasps[0].opening_mm.has_value());
+  EXPECT_EQ(part.grasps[0].holding_mm, 120.0);
+  EXPECT_EQ(part.grasps[0].retreat_mm, 0);
+  EXPECT_EQ(part.grasps[0].preference, 0);
+  EXPECT_EQ(loaded->reach.unmeasured, vision::Unmeasured::Blocked);
+  EXPECT_FALSE(loaded->reach.clearance_mm.has_value());
+}
+
+TEST(Part, AGripperWithoutJawsIsItsBody) {
+  CellFolder folder;
+  folder.part = R"(mesh = "track_link.stl"
+[[gripper_body]]
+shape = "cylinder"
+size_mm = [40, 40, 60]
+T_tcp_solid = { xyz_mm = [0, 0, -30], rpy_deg = [0, 0, 0] }
+[[gripper_body]]
+shape = "box"
+size_mm = [100, 80, 60]
+T_tcp_solid = { xyz_mm = [0, 0, -90], rpy_deg = [0, 0, 45] }
+[[grasp]]
+T_object_tcp = { xyz_mm = [0, 0, 0], rpy_deg = [180, 0, 0] }
+retreat_mm = 50
+preference = -1.5
+)";
+  const auto loaded = folder.load();
+  ASSERT_TRUE(loaded.has_value()) << folder.findings();
+  const Part& part = loaded->recipes[0].part;
+  ASSERT_TRUE(part.gripper.has_value());
+  EXPECT_FALSE(part.gripper->jaws.has_value());
+  ASSERT_EQ(part.gripper->body.size(), 2U);
+  EXPECT_EQ(part.gripper->body[0].shape, vision::Gripper::Solid::Shape::Cylinder);
+  EXPECT_NEAR(part.gripper->body[1].T_tcp_solid.linear()(1, 0), std::sqrt(0.5), 1e-12);
+  EXPECT_EQ(part.grasps[0].retreat_mm, 50);
+  EXPECT_EQ(part.grasps[0].preference, -1.5);
+}
+
+TEST(Part, GraspsFitTheirGripper) {
+  struct Wrong {
+    const char *from, *to, *line, *said;
+  };
+  for (const Wrong& wrong : {
+           Wrong{"# opening_mm = 140", "opening_mm = 150", "opening_mm",
+                 ":14: grasp.opening_mm = 150 is more than gripper.opening_max_mm = 140; use less, or correct the "
+                 "gripper\n"},
+           Wrong{"holding_mm = 120", "holding_mm = 140.5", "holding_mm",
+                 ":14: grasp.holding_mm = 140.5 is more than gripper.opening_max_mm = 140; use less, or correct the "
+                 "gripper\n"},
+           Wrong{"holding_mm = 120", "", "[[grasp]]",
+                 ":1: grasp.holding_mm is missing in [[grasp]], but the gripper has jaws; add how far they stand apart "
+                 "when they hold the part, for example: holding_mm = 120\n"},
+           Wrong{
+               "holding_mm = 120", "holding_mm = 140", "holding_mm",
+               ":14: grasp.holding_mm = 140 is as wide as the jaws stand on the way in, so they never close; use less "
+               "(or more, for a grip from within), or another opening_mm\n"},
+           Wrong{"shape = \"box\"", "shape = \"cylinder\"", "size_mm",
+                 ":11: gripper_body.size_mm of a cylinder has two diameters, 170 and 90; write [diameter, diameter, "
+                 "length]\n"},
+           Wrong{"holding_mm = 120", "holding_mm = -1", "holding_mm",
+                 ":14: grasp.holding_mm = -1 is outside 0 … 5000; use at least 0\n"},
+           Wrong{"opening_max_mm = 140", "opening_max_mm = 0", "opening_max_mm",
+                 ":18: gripper.opening_max_mm = 0 is outside 0.1 … 5000; use at least 0.1\n"},
+       }) {
+    CellFolder folder;
+    folder.edit_part(wrong.from, wrong.to);
+    EXPECT_EQ(folder.findings(), "track_link.toml:" + folder.part_line_of(wrong.line) + wrong.said);
+  }
+}
+
+TEST(Part, OpeningsWithoutJawsAreNamed) {
+  CellFolder folder;
+  const std::size_t from = folder.part.find("[gripper]"), to = folder.part.find("[[gripper_body]]");
+  folder.part.erase(from, to - from);
+  folder.edit_part("# opening_mm = 140", "opening_mm = 130");
+  const std::string remedy =
+      " is for a gripper with jaws, but there is no section [gripper]; add it, with opening_max_mm and jaw_size_mm, or "
+      "remove this\n";
+  EXPECT_EQ(folder.findings(), "track_link.toml:" + folder.part_line_of("opening_mm") + ":14: grasp.opening_mm" +
+                                   remedy + "track_link.toml:" + folder.part_line_of("holding_mm") +
+                                   ":14: grasp.holding_mm" + remedy);
 }
 
 TEST(Part, APartWithoutGraspCannotBePickedButTrained) {
