@@ -369,7 +369,8 @@ const Section<Supply>& supply_section() {
            [](S& s) -> Slot { return &s.scan_path; }},
           {{.name = "path_timeout_ms", .type = Integer, .unit = "ms", .min = 500, .max = 120000, .only_for = kOnRobot,
             .default_value = "10000",
-            .help = "From the beginning of the path to its end; longer is a fault. Less than plc.scan_timeout_ms."},
+            .help = "From the beginning of the path to its end; longer is a fault. plc.scan_timeout_ms holds for this and "
+                    "for the robot's way to the beginning."},
            [](S& s) -> Slot { return &s.path_timeout; }},
       }};
   return section;

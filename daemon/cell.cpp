@@ -8,6 +8,8 @@
 
 namespace binpick::daemon {
 namespace {
+/// Of the supply: a scan that saw less and has found nothing tells little of it.
+constexpr double kMeasuredMin = 0.3;
 /// To the start of a sweep the pivot drives with this share of what the module can do.
 constexpr double kPositioningShare = 0.4;
 /// The alarm for lines that were not understood goes when there was none for so long.
@@ -28,8 +30,9 @@ std::optional<drivers::robot::PoseSource> poses_of(const config::Config& config)
   return drivers::robot::PoseSource{config.pose_options()};
 }
 
-/// Each start of the daemon has some thousand scan numbers of its own before it meets those of the start before.
-std::uint16_t scans_before(std::uint16_t boot_count) { return static_cast<std::uint16_t>(boot_count * 4099U); }
+/// Each start of the daemon has some thousand scan numbers and pick ids of its own before it meets those of the start
+/// before: a report that a robot kept through our restart names no pick of today.
+std::uint16_t numbers_before(std::uint16_t boot_count) { return static_cast<std::uint16_t>(boot_count * 4099U); }
 
 std::uint16_t to_u16(double value) { return static_cast<std::uint16_t>(std::clamp(std::lround(value), 0L, 65535L)); }
 }  // namespace
@@ -44,9 +47,10 @@ Cell::Cell(std::shared_ptr<const CellData> data, std::uint16_t boot_count)
       poses_{poses_of(data_->config)},
       pivot_carrier_{pivot_},
       robot_carrier_{poses_
-                         ? std::make_optional<drivers::sweep::RobotCarrier>(robot_, *poses_, scans_before(boot_count))
+                         ? std::make_optional<drivers::sweep::RobotCarrier>(robot_, *poses_, numbers_before(boot_count))
                          : std::nullopt},
-      sweep_{carrier(), scanner_} {
+      sweep_{carrier(), scanner_},
+      pick_id_{numbers_before(boot_count)} {
   robot_.withdraw(drivers::robot::NoPick::NotReady);
 }
 
@@ -277,6 +281,11 @@ void Cell::publish(TimePoint now) {
                                         : plc::ResultCode::NothingFound;
     // The robot's codes for "no pick" are the PLC's result codes.
     robot_.withdraw(static_cast<drivers::robot::NoPick>(answer.code));
+    if (result.fill.measured < kMeasuredMin)
+      BINPICK_LOG(Warning, "cell", "cycle %llu: only %.0f %% of the supply was measured; %s",
+                  static_cast<unsigned long long>(cycle_id_), 100 * result.fill.measured,
+                  robot_carrier_ ? "let the robot say begin and end where its path does, and move slower"
+                                 : "clean the scanner's window, look at the sweep's angles and at what is dark or mirrors");
     for (const auto& unreachable : result.choice.unreachable)
       BINPICK_LOG(Info, "cell", "object %zu is not reachable: %s", unreachable.detection, unreachable.reason.c_str());
   }
@@ -299,15 +308,18 @@ void Cell::stop_cycle(TimePoint now) {
   robot_.withdraw(drivers::robot::NoPick::Fault);
 }
 
-void Cell::device_failed(plc::Alarm alarm, const std::string& text, TimePoint now) {
-  BINPICK_LOG(Warning, "cell", "%s", text.c_str());
-  cycle_alarm_ = alarm;
-  plc_.raise(alarm, now);
+void Cell::device_failed(std::optional<Trouble>& standing, Trouble trouble, TimePoint now) {
+  // A device that refuses is asked again every second, for days perhaps: the log has it once.
+  if (!standing || standing->text != trouble.text) BINPICK_LOG(Warning, "cell", "%s", trouble.text.c_str());
+  if (standing && standing->alarm != trouble.alarm) alarm_off(standing, now);
+  standing = std::move(trouble);
+  cycle_alarm_ = standing->alarm;
+  plc_.raise(standing->alarm, now);
   apply(CellInput::DeviceLost, now);
 }
 
-void Cell::alarm_off(std::optional<plc::Alarm>& standing, TimePoint now) {
-  if (standing) plc_.clear(*standing, now);
+void Cell::alarm_off(std::optional<Trouble>& standing, TimePoint now) {
+  if (standing) plc_.clear(standing->alarm, now);
   standing.reset();
 }
 

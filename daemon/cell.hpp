@@ -71,8 +71,13 @@ class Cell {
   void put_in_force(TimePoint now);
   void update_ready(TimePoint now);
   void watch_robot_lines(TimePoint now);
-  void device_failed(plc::Alarm alarm, const std::string& text, TimePoint now);
-  void alarm_off(std::optional<plc::Alarm>& standing, TimePoint now);
+  /// What is wrong with a device, from its failure until it is ready again.
+  struct Trouble {
+    plc::Alarm alarm;
+    std::string text;
+  };
+  void device_failed(std::optional<Trouble>& standing, Trouble trouble, TimePoint now);
+  void alarm_off(std::optional<Trouble>& standing, TimePoint now);
 
   void on(const plc::Event& event, TimePoint now);
   void on(const drivers::pivot::Event& event, TimePoint now);
@@ -98,8 +103,7 @@ class Cell {
   bool robot_lost_ = false;
   std::uint64_t robot_bad_lines_ = 0;
   std::optional<TimePoint> robot_bad_since_;
-  std::optional<plc::Alarm> pivot_alarm_, scanner_alarm_,
-      poses_alarm_;  // standing, cleared when the device is ready again
+  std::optional<Trouble> pivot_trouble_, scanner_trouble_, poses_trouble_;
   std::uint64_t cycle_id_ = 0;
   std::uint16_t pick_id_ = 0;
   plc::Alarm cycle_alarm_ = plc::Alarm::None;  // why FaultCycle

@@ -123,39 +123,31 @@ void Cell::on(const drivers::pivot::Event& event, TimePoint now) {
     BINPICK_LOG(Notice, "pivot", "ready: module %u, firmware %04x, serial %u, %.1f … %.1f deg, %.1f deg/s at most",
                 started_with_.pivot.module_id, module_->firmware, module_->serial, module_->position_min.in_deg(),
                 module_->position_max.in_deg(), Angle::rad(module_->velocity_max_rad_s).in_deg());
-    alarm_off(pivot_alarm_, now);
+    alarm_off(pivot_trouble_, now);
   }
   if (const auto news = pivot_carrier_.on(event); news && !robot_carrier_) sweep_.on_carrier(*news, now);
-  if (const auto* failed = std::get_if<drivers::pivot::Failed>(&event)) {
-    if (pivot_alarm_ && *pivot_alarm_ != alarm_of(*failed)) alarm_off(pivot_alarm_, now);
-    pivot_alarm_ = alarm_of(*failed);
-    device_failed(*pivot_alarm_, "pivot: " + failed->text, now);
-  }
+  if (const auto* failed = std::get_if<drivers::pivot::Failed>(&event))
+    device_failed(pivot_trouble_, {alarm_of(*failed), "pivot: " + failed->text}, now);
 }
 
 void Cell::on(const drivers::scanner::Event& event, TimePoint now) {
   if (const auto* ready = std::get_if<drivers::scanner::Ready>(&event)) {
     BINPICK_LOG(Notice, "scanner", "ready: %s", drivers::scanner::in_words(*ready).c_str());
-    alarm_off(scanner_alarm_, now);
+    alarm_off(scanner_trouble_, now);
   }
   sweep_.on_scanner(event, now);
-  if (const auto* failed = std::get_if<drivers::scanner::Failed>(&event)) {
-    if (scanner_alarm_ && *scanner_alarm_ != alarm_of(*failed)) alarm_off(scanner_alarm_, now);
-    scanner_alarm_ = alarm_of(*failed);
-    device_failed(*scanner_alarm_, "scanner: " + failed->text, now);
-  }
+  if (const auto* failed = std::get_if<drivers::scanner::Failed>(&event))
+    device_failed(scanner_trouble_, {alarm_of(*failed), "scanner: " + failed->text}, now);
 }
 
 void Cell::on(const drivers::robot::PoseEvent& event, TimePoint now) {
   if (const auto* ready = std::get_if<drivers::robot::PoseReady>(&event)) {
     BINPICK_LOG(Notice, "robot", "its poses come; their times are known within %.1f ms", in_ms(ready->uncertainty));
-    alarm_off(poses_alarm_, now);
+    alarm_off(poses_trouble_, now);
   }
   if (const auto news = robot_carrier_->on(event)) sweep_.on_carrier(*news, now);
-  if (const auto* failed = std::get_if<drivers::robot::PoseFailed>(&event)) {
-    poses_alarm_ = plc::Alarm::RobotPosesLost;
-    device_failed(*poses_alarm_, "robot: " + failed->text, now);
-  }
+  if (const auto* failed = std::get_if<drivers::robot::PoseFailed>(&event))
+    device_failed(poses_trouble_, {plc::Alarm::RobotPosesLost, "robot: " + failed->text}, now);
 }
 
 void Cell::on(const drivers::robot::Event& event, TimePoint now) {
@@ -215,12 +207,15 @@ void Cell::on(drivers::sweep::Event& event, TimePoint now) {
           },
           [&](const drivers::sweep::Failed& failed) {
             using Device = drivers::sweep::Failed::Device;
+            const auto of = [](const std::optional<Trouble>& trouble, plc::Alarm otherwise) {
+              return trouble ? trouble->alarm : otherwise;
+            };
             cycle_alarm_ = failed.device == Device::Poses
                                ? (robot_carrier_ ? plc::Alarm::RobotPosesLost : plc::Alarm::PivotNoReply)
                            : failed.device == Device::Carrier && robot_carrier_
-                               ? poses_alarm_.value_or(plc::Alarm::RobotPathBroken)
-                           : failed.device == Device::Carrier ? pivot_alarm_.value_or(plc::Alarm::PivotModuleError)
-                           : failed.device == Device::Scanner ? scanner_alarm_.value_or(plc::Alarm::ScannerNoReply)
+                               ? of(poses_trouble_, plc::Alarm::RobotPathBroken)
+                           : failed.device == Device::Carrier ? of(pivot_trouble_, plc::Alarm::PivotModuleError)
+                           : failed.device == Device::Scanner ? of(scanner_trouble_, plc::Alarm::ScannerNoReply)
                            : robot_carrier_                   ? plc::Alarm::RobotPathBroken
                                                               : plc::Alarm::ScanTimeout;
             BINPICK_LOG(Warning, "cell", "cycle %llu: sweep failed: %s", static_cast<unsigned long long>(cycle_id_),

@@ -38,8 +38,8 @@ struct StreamPeer {
 
 struct TcpClientOptions {
   Duration connect_timeout = std::chrono::seconds(2);
-  Duration retry_first =
-      std::chrono::milliseconds(200);  ///< Doubles up to retry_max (a long back-off keeps a cell down).
+  /// Doubles up to retry_max (a long back-off keeps a cell down), until a connection has stood for five seconds.
+  Duration retry_first = std::chrono::milliseconds(200);
   Duration retry_max = std::chrono::seconds(1);
   std::size_t unsent_bytes_max = 1 << 20;  ///< A peer that does not read is dropped.
 };
@@ -56,7 +56,7 @@ class TcpClient final : public DeviceLink {
   void on_deadline(TimePoint now) override;  ///< Starts or gives up a connection attempt when it is time.
   std::optional<TimePoint> deadline() const override;
   void flush(TimePoint now) override;
-  void reopen(TimePoint now) override;  ///< Reconnects after retry_first.
+  void reopen(TimePoint now) override;  ///< Reconnects after the pause that has come up.
   bool connected() const;
   std::string last_error() const override;  ///< Why the last attempt failed ("connection refused").
 
@@ -77,6 +77,7 @@ class TcpClient final : public DeviceLink {
   State state_ = State::Waiting;
   int fd_ = -1;
   Duration retry_;
+  TimePoint connected_at_{};
   std::optional<TimePoint> deadline_ = TimePoint{};  // at once
   std::size_t attempts_ = 0;                         // a name with several addresses is tried in turn
   std::unique_ptr<Resolver> resolver_;

@@ -11,6 +11,8 @@
 
 namespace binpick::drivers::link {
 namespace {
+constexpr Duration kStood = std::chrono::seconds(5);
+
 std::string error_text(int error) { return std::generic_category().message(error); }
 
 /// On loopback the kernel may join a connecting socket with itself when its own port is the one asked for.
@@ -85,7 +87,7 @@ void TcpClient::on_connect_done(TimePoint now) {
   if (talks_to_itself(fd_)) return drop(now, error_text(ECONNREFUSED));
   state_ = State::Connected;
   deadline_.reset();
-  retry_ = options_.retry_first;
+  connected_at_ = now;
   last_error_.clear();
   wants_write_ = false;
   loop_.change(fd_, EPOLLIN | EPOLLRDHUP);
@@ -104,6 +106,8 @@ void TcpClient::drop(TimePoint now, const std::string& why) {
   unsent_.clear();
   state_ = State::Waiting;
   last_error_ = why;
+  // A peer that is reached and refused, or that hangs up at once, is no better than one that is not there.
+  if (was_connected && now - connected_at_ >= kStood) retry_ = options_.retry_first;
   deadline_ = now + retry_;
   retry_ = std::min(2 * retry_, options_.retry_max);
   if (!was_connected) return;
@@ -111,10 +115,7 @@ void TcpClient::drop(TimePoint now, const std::string& why) {
   if (peer_.take_output) peer_.take_output();  // meant for a connection that is gone
 }
 
-void TcpClient::reopen(TimePoint now) {
-  retry_ = options_.retry_first;
-  drop(now, kClosedByUs);
-}
+void TcpClient::reopen(TimePoint now) { drop(now, kClosedByUs); }
 
 void TcpClient::on_event(std::uint32_t events, TimePoint now) {
   if (state_ == State::Connecting) return on_connect_done(now);

@@ -26,7 +26,6 @@ void PoseIntake::push(PoseEvent event) {
 }
 
 void PoseIntake::fail(PoseFailed::Why why, std::string text) {
-  BINPICK_LOG(Warning, "robot", "%s", text.c_str());
   state_ = PoseState::Offline;
   push(PoseFailed{why, std::move(text)});
 }

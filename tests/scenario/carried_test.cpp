@@ -1,7 +1,11 @@
+#include <algorithm>
 #include <cstdio>
 #include <gtest/gtest.h>
 #include <string>
+#include <string_view>
+#include <vector>
 
+#include "base/log.hpp"
 #include "tests/emulators/program/scan_paths.hpp"
 #include "tests/support/cell_file.hpp"
 #include "tests/support/emulated_cell.hpp"
@@ -106,6 +110,38 @@ INSTANTIATE_TEST_SUITE_P(Robots, TimeSync,
                          [](const auto& one) {
                            return std::string{one.param.robot} + (one.param.path == kLinearPath ? "_linear" : "_pan");
                          });
+
+TEST_P(Carried, APathThatIsTooFastToMeasureOnIsNoEmptySupply) {
+  const auto& config = cell.cell().data().config;
+  emulators::RobotOptions hasty{.dialect = config.robot.dialect,
+                                .paths = emulators::scan_paths(config, config.supplies[0])};
+  for (auto& [number, path] : hasty.paths) path.duration = 40ms;
+  const auto on_grasp = cell.robot.on_grasp;
+  cell.robot.faults.unplugged = true;
+  cell.run_for(1s);
+  cell.robot = emulators::Robot{hasty};
+  cell.robot.on_grasp = on_grasp;
+  ASSERT_TRUE(cell.run_until_ready());
+  std::string log;
+  log::set_sink([&](log::Level, std::string_view, std::string_view text) { log += text; });
+  const auto result = cell.pick();
+  log::set_sink({});
+  ASSERT_TRUE(result.has_value());
+  EXPECT_EQ(result->code, plc::ResultCode::NothingFound);
+  EXPECT_NE(log.find("% of the supply was measured"), std::string::npos);
+}
+
+TEST_P(Carried, WhatIsWrongWithThePosesStandsInTheLogOnce) {
+  std::vector<std::string> lines;
+  cell.rtde.faults.silent = cell.pose_sender.faults.silent = true;
+  log::set_sink([&](log::Level, std::string_view, std::string_view text) { lines.emplace_back(text); });
+  cell.run_for(60s);
+  log::set_sink({});
+  // Once for the poses that cease; where we ask for them (RTDE), once more as nobody answers that.
+  EXPECT_EQ(std::ranges::count_if(lines, [](const auto& line) { return line.starts_with("robot: pose"); }),
+            GetParam() == std::string_view{"ur"} ? 2 : 1);
+  EXPECT_FALSE(cell.plc.ready());
+}
 
 TEST_P(Carried, APathThatTheRobotBreaksOffIsAnAlarmAndTheNextOneAPick) {
   cell.robot.stops_at = 0.5;

@@ -87,7 +87,6 @@ struct Session::Impl {
   }
 
   void fail(Failed::Why why, std::string text) {
-    BINPICK_LOG(Warning, "scanner", "%s", text.c_str());
     reset();
     reopen = why != Failed::Why::LinkLost;
     push(Failed{why, std::move(text)});

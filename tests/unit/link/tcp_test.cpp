@@ -276,6 +276,31 @@ TEST(Tcp, TheSessionIsToldOfAClosedConnectionAndTheLinkComesBack) {
       loop, [&] { return c.ups == 3 && s.order.size() == 5; }, client, server));
 }
 
+TEST(Tcp, APeerThatIsRefusedAgainAndAgainIsCalledLessOften) {
+  Loop loop;
+  ServerSide s;
+  TcpServer server{loop, {"127.0.0.1", 0}, s.peer()};
+  ClientSide c;
+  TcpClientOptions options;
+  options.retry_first = 1ms;
+  options.retry_max = 8ms;
+  TcpClient client{loop, {"127.0.0.1", server.port()}, c.peer(), options};
+  for (const auto pause : {1ms, 2ms, 4ms, 8ms, 8ms}) {
+    const int ups = c.ups;
+    ASSERT_TRUE(pump_until(
+        loop, [&] { return c.ups > ups; }, client, server));
+    const auto now = std::chrono::steady_clock::now();
+    client.reopen(now);
+    EXPECT_EQ(client.deadline(), now + pause);
+  }
+  // One that stood for a while is called at once again.
+  ASSERT_TRUE(pump_until(
+      loop, [&] { return client.connected(); }, client, server));
+  const auto later = std::chrono::steady_clock::now() + 6s;
+  client.reopen(later);
+  EXPECT_EQ(client.deadline(), later + 1ms);
+}
+
 TEST(Tcp, OutputOfABrokenConnectionIsNotSentOnTheNext) {
   Loop loop;
   ServerSide s;
