@@ -284,8 +284,9 @@ void Cell::publish(TimePoint now) {
     if (result.fill.measured < kMeasuredMin)
       BINPICK_LOG(Warning, "cell", "cycle %llu: only %.0f %% of the supply was measured; %s",
                   static_cast<unsigned long long>(cycle_id_), 100 * result.fill.measured,
-                  robot_carrier_ ? "let the robot say begin and end where its path does, and move slower"
-                                 : "clean the scanner's window, look at the sweep's angles and at what is dark or mirrors");
+                  robot_carrier_
+                      ? "let the robot say begin and end where its path does, and move slower"
+                      : "clean the scanner's window, look at the sweep's angles and at what is dark or mirrors");
     for (const auto& unreachable : result.choice.unreachable)
       BINPICK_LOG(Info, "cell", "object %zu is not reachable: %s", unreachable.detection, unreachable.reason.c_str());
   }
