@@ -104,6 +104,7 @@ class Detecting {
     ended("rendered test");
     report(selected);
     observed("selection", report_.detections, [](const Detection& d) { return d.T_supply_object.iso; });
+    report_.cut_short = deadline_.cut_short();
     report_.time_ms = milliseconds_since(start_);
     spare_scene() = std::move(scene_);
     return std::move(report_);

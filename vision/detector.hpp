@@ -76,6 +76,7 @@ struct DetectionReport {
   std::size_t maxima = 0;
   std::size_t hypotheses = 0;  ///< Tested against the depth image.
   std::optional<FirstValid> first;
+  bool cut_short = false;  ///< By the deadline: with more time there would have been more to look at.
   std::map<std::string, double> stages_ms;
   double time_ms = 0;
 };

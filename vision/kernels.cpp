@@ -1,5 +1,6 @@
 #include "vision/kernels.hpp"
 
+#include <atomic>
 #include <cstdlib>
 #include <string_view>
 
@@ -13,24 +14,33 @@ extern const Table kAvx2;
 
 namespace {
 const Table& best() {
-#ifdef BINPICK_AVX2_KERNELS
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return kAvx2;
-#endif
-  return kPortable;
+  const Table* fast = find("avx2");
+  return fast == nullptr ? kPortable : *fast;
+}
+
+std::atomic<const Table*>& current() {
+  static std::atomic<const Table*> loops{&chosen(std::getenv("BINPICK_LOOPS"))};
+  return loops;
 }
 }  // namespace
 
 const Table& portable() { return kPortable; }
 
+const Table* find(std::string_view name) {
+#ifdef BINPICK_AVX2_KERNELS
+  if (name == kAvx2.name) return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") ? &kAvx2 : nullptr;
+#endif
+  return name == kPortable.name ? &kPortable : nullptr;
+}
+
 const Table& chosen(const char* loops) {
   if (loops == nullptr || *loops == 0) return best();
-  if (loops == std::string_view{kPortable.name}) return kPortable;
-  BINPICK_LOG(Warning, "vision", "BINPICK_LOOPS=%s is not known; portable is, or leave it away for the fastest", loops);
+  if (const Table* named = find(loops)) return *named;
+  BINPICK_LOG(Warning, "vision", "BINPICK_LOOPS=%s is not known here; portable is, or leave it away for the fastest",
+              loops);
   return best();
 }
 
-const Table& table() {
-  static const Table& loops = chosen(std::getenv("BINPICK_LOOPS"));
-  return loops;
-}
+const Table& table() { return *current().load(std::memory_order_relaxed); }
+void use(const Table& loops) { current().store(&loops, std::memory_order_relaxed); }
 }  // namespace binpick::vision::kernels

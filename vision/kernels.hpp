@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string_view>
 
 /// The inner loops of detection. They are compiled twice, for any x86-64 and for one with AVX2 and FMA, and chosen when
 /// the program runs. Plain arrays only: an inline function of another header that were compiled with AVX2 here could be
@@ -151,9 +152,13 @@ struct Table {
                         float* distance_px, std::int32_t* nearest);
 };
 
-/// Best for this processor; the portable one where the environment has BINPICK_LOOPS=portable when it is first asked
-/// for.
+/// Best for this processor, or those that the environment names in BINPICK_LOOPS when it is first asked for, or that
+/// use() was given last.
 const Table& table();
+/// table() is these from now on. Not while a detection runs: half of it would go either way.
+void use(const Table& loops);
+/// By their name; null: neither this build nor this processor has them.
+const Table* find(std::string_view name);
 /// What table() is with that value of BINPICK_LOOPS; null: not set.
 const Table& chosen(const char* loops);
 /// For comparisons: the portable one.

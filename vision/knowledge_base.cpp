@@ -87,6 +87,9 @@ Expected<void, KnowledgeBaseError> KnowledgeBase::save(const std::string& path) 
 }
 
 KnowledgeBase::KnowledgeBase(std::shared_ptr<const Impl> impl) : impl_{std::move(impl)} {}
+std::uint64_t KnowledgeBase::checksum() const {
+  return item_at<std::uint64_t>(impl_->file.bytes, kKnowledgeBaseChecksumAt);
+}
 const std::string& KnowledgeBase::part_name() const { return impl_->part_name; }
 const Mesh& KnowledgeBase::mesh() const { return impl_->mesh; }
 const Symmetry& KnowledgeBase::symmetry() const { return impl_->symmetry; }

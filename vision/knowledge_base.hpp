@@ -75,6 +75,8 @@ class KnowledgeBase {
   Expected<void, KnowledgeBaseError> verify() const;
   Expected<void, KnowledgeBaseError> save(const std::string& path) const;
 
+  /// Of the whole file: the same for the same training, whatever its name.
+  std::uint64_t checksum() const;
   const std::string& part_name() const;
   const Mesh& mesh() const;
   const Symmetry& symmetry() const;

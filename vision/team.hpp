@@ -14,10 +14,17 @@ namespace binpick::vision {
 class Deadline {
  public:
   explicit Deadline(std::optional<std::chrono::steady_clock::time_point> at = std::nullopt) : at_{at} {}
-  bool expired() const { return at_ && std::chrono::steady_clock::now() >= *at_; }
+  bool expired() const {
+    if (!at_ || std::chrono::steady_clock::now() < *at_) return false;
+    told_.store(true, std::memory_order_relaxed);
+    return true;
+  }
+  /// Somebody who had more to do was told that it has expired.
+  bool cut_short() const { return told_.load(std::memory_order_relaxed); }
 
  private:
   std::optional<std::chrono::steady_clock::time_point> at_;
+  mutable std::atomic<bool> told_{false};
 };
 
 /// Calls work(index, thread) for 0 … count - 1, each once, on up to `threads` threads, until the deadline expires.

@@ -146,6 +146,8 @@ TEST(Detector, AsksForTheRestOfTheSupplyOnlyWhereItIsKnownAndLookedAt) {
   };
   const DetectionReport cut_off = detect(image, kSupply, bracket_base(), late);
   ASSERT_LT(error_of(cut_off, truth).mm, 5);
+  EXPECT_TRUE(cut_off.cut_short);
+  EXPECT_FALSE(not_asked.cut_short);
   EXPECT_GT(cut_off.detections[0].score, asked + 0.1) << "others may have been left out";
   const DetectionReport no_walls = detect(image, {}, bracket_base(), scenes::options());
   ASSERT_LT(error_of(no_walls, truth).mm, 5);
@@ -286,6 +288,7 @@ TEST(Detector, ADeadlineInThePastStillReturns) {
   const DetectionReport report =
       detect(scenes::image_of(bracket_base().mesh(), {pose(0, 0, 0, 0)}, 2), kSupply, bracket_base(), options);
   EXPECT_TRUE(report.detections.empty());
+  EXPECT_TRUE(report.cut_short);
 }
 
 TEST(Detector, MaxLimitsTheList) {

@@ -179,5 +179,16 @@ TEST(Kernels, CoarseTestCountsSamples) {
 TEST(Kernels, TheEnvironmentMayAskForThePortableLoops) {
   EXPECT_EQ(&chosen("portable"), &portable());
   for (const char* loops : {"", "avx512"}) EXPECT_EQ(&chosen(loops), &chosen(nullptr)) << "the fastest";
+  EXPECT_EQ(&chosen(chosen(nullptr).name), &chosen(nullptr));
+}
+
+TEST(Kernels, AProgramMayAskForLoopsByName) {
+  EXPECT_EQ(find("avx512"), nullptr);
+  const Table& before = table();
+  EXPECT_EQ(find(before.name), &before);
+  use(*find("portable"));
+  EXPECT_EQ(&table(), &portable());
+  use(before);
+  EXPECT_EQ(&table(), &before);
 }
 }  // namespace binpick::vision::kernels
