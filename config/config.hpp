@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -38,6 +39,7 @@ struct Supply {
 /// A PART.toml.
 struct Part {
   std::string path;       ///< Of the PART.toml.
+  std::string text;       ///< Its content, as it was read.
   std::string mesh_path;  ///< Resolved against the PART.toml's folder.
   double mesh_unit_mm = 1;
   vision::PartOptions options;
@@ -65,6 +67,7 @@ enum class Carrier { Pivot, Robot };
 
 struct Config {
   std::string path;
+  std::string text;  ///< Its content, as it was read.
   std::string name;
   std::string plc_listen;  ///< "host:port"; plc.address in the role of a client.
   plc::Options plc;
@@ -96,7 +99,7 @@ struct Config {
   vision::ReachLimits reach;
   Detection detection;
   std::string picture_dir;  ///< A PNG per cycle goes here; empty: none.
-  std::string state_dir;    ///< boot_count lives here.
+  std::string state_dir;  ///< boot_count lives here.
 
   /// Where the PLC is, as `plc.role` says: where it connects to, or where it is asked.
   const std::string& plc_line() const { return plc.role == plc::LineRole::Client ? plc.address : plc_listen; }
@@ -123,6 +126,13 @@ Expected<Part, std::vector<Diagnostic>> load_part(const std::string& path);
 /// The same from text in memory. `path` names it in findings, and paths in it are relative to that one's folder.
 Expected<Config, std::vector<Diagnostic>> load_text(const std::string& path, std::string_view text);
 Expected<Part, std::vector<Diagnostic>> load_part_text(const std::string& path, std::string_view text);
+
+/// Text of a file as it once was.
+struct FileText {
+  std::string path, text;
+};
+/// A cell file with part files as they once were: what `parts` lacks cannot be opened, and meshes need not be there.
+Expected<Config, std::vector<Diagnostic>> load_texts(const FileText& cell, std::span<const FileText> parts);
 
 /// Keys whose change takes effect only with a restart, by name ("plc.listen"), of those that differ between two files.
 std::vector<std::string> needs_restart(const Config& running, const Config& edited);

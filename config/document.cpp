@@ -220,6 +220,8 @@ void parse_lines(Document& document, Findings& findings) {
   }
 }
 
+}  // namespace
+
 Document refused(const std::string& file, std::string message) {
   Document document;
   document.file = file;
@@ -229,7 +231,6 @@ Document refused(const std::string& file, std::string message) {
   document.findings = findings.take();
   return document;
 }
-}  // namespace
 
 const Member* Value::find(std::string_view key) const {
   const auto it = std::find_if(members.begin(), members.end(), [&](const Member& m) { return m.key == key; });
@@ -244,6 +245,7 @@ Document parse(const std::string& file, std::string_view text) {
     return refused(file, "has more than " + std::to_string(kFileBytesMax / 1024) + " KiB; is it the right file?");
   Document document;
   document.file = file;
+  document.text = text;
   document.lines = split_lines(text);
   Findings findings{file, document.lines};
   const auto give_up = [&](const Place& place, std::string message) {

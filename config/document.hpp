@@ -33,6 +33,7 @@ struct Member {
 
 struct Document {
   std::string file;                ///< As it is named in findings.
+  std::string text;                ///< As it was given.
   std::vector<std::string> lines;  ///< Without line ends.
   Value root;
   std::vector<Diagnostic> findings;    ///< Of syntax, in order.
@@ -46,6 +47,9 @@ inline constexpr std::size_t kFileBytesMax = 1 << 18;
 /// Parses text. A line with a syntax error is reported and skipped, so that one run shows (nearly) all mistakes. Takes
 /// any bytes: a byte-order mark and CRLF are accepted, UTF-16 and Latin-1 are refused with a remedy.
 Document parse(const std::string& file, std::string_view text);
+
+/// A file that cannot be used, and why: one finding about it as a whole.
+Document refused(const std::string& file, std::string message);
 
 /// Reads and parses a file; one that cannot be read (missing, a directory, a device, too large) is a finding.
 Document open(const std::string& path);

@@ -1,4 +1,5 @@
 #include <filesystem>
+#include <functional>
 #include <limits>
 #include <map>
 
@@ -78,10 +79,13 @@ void report_strangers(const Document& document, const std::vector<std::string>& 
   }
 }
 
+enum class MeshFile { Needed, OfNoMatter };
+
 /// Parses one part document. Findings are about the part file; `part` is whole only when there are none.
-std::vector<Diagnostic> read_part(Document document, Part& part) {
+std::vector<Diagnostic> read_part(Document document, Part& part, MeshFile mesh = MeshFile::Needed) {
   if (!document.usable) return document.findings;
   part.path = document.file;
+  part.text = std::move(document.text);
   Findings findings{document.file, document.lines};
   const ReadContext context{findings, document.damaged_keys};
   const Places head =
@@ -90,7 +94,7 @@ std::vector<Diagnostic> read_part(Document document, Part& part) {
   if (head.given("mesh")) {
     part.mesh_path = resolved(document.file, part.mesh_path);
     std::error_code failure;
-    if (!fs::is_regular_file(part.mesh_path, failure))
+    if (mesh == MeshFile::Needed && !fs::is_regular_file(part.mesh_path, failure))
       findings.add(head.of("mesh"), "mesh: there is no file " + printable(part.mesh_path) +
                                         "; give its path from the folder of this file");
   }
@@ -128,9 +132,16 @@ std::vector<Diagnostic> read_part(Document document, Part& part) {
   return all;
 }
 
+/// Where part files come from.
+struct PartSource {
+  std::function<Document(const std::string& path)> open;
+  MeshFile mesh = MeshFile::Needed;
+};
+
 /// Reads the part files of the recipes; each file's own findings once.
-std::vector<Diagnostic> read_parts(const std::string& cell_file, const std::vector<std::string>& files, Config& config,
-                                   const CellPlaces& places, Findings& findings) {
+std::vector<Diagnostic> read_parts(const std::string& cell_file, const std::vector<std::string>& files,
+                                   const PartSource& source, Config& config, const CellPlaces& places,
+                                   Findings& findings) {
   std::vector<Diagnostic> of_parts;
   std::map<std::string, Part> known;
   for (std::size_t i = 0; i < config.recipes.size(); ++i) {
@@ -140,14 +151,14 @@ std::vector<Diagnostic> read_parts(const std::string& cell_file, const std::vect
       config.recipes[i].part = it->second;
       continue;
     }
-    Document document = open(path);
+    Document document = source.open(path);
     if (!document.usable && !document.findings.empty() && document.findings.front().line == 0) {
       findings.add(places.parts[i].of("file"),
                    "part.file: " + printable(path) + " " + document.findings.front().message);
       continue;
     }
     Part part;
-    auto part_findings = read_part(std::move(document), part);
+    auto part_findings = read_part(std::move(document), part, source.mesh);
     if (part_findings.empty() && part.grasps.empty())
       findings.add(places.parts[i].of("file"),
                    "part.file: " + printable(path) + " has no [[grasp]], so nothing can be picked; add one");
@@ -227,7 +238,8 @@ CellPlaces read_cell(const Document& document, Config& config, std::vector<std::
   return places;
 }
 
-Expected<Config, std::vector<Diagnostic>> load_document(const std::string& path, Document document) {
+Expected<Config, std::vector<Diagnostic>> load_document(const std::string& path, Document document,
+                                                        const PartSource& parts = {open}) {
   if (!document.usable) return unexpected(std::move(document.findings));
   Config config;
   config.path = path;
@@ -237,7 +249,7 @@ Expected<Config, std::vector<Diagnostic>> load_document(const std::string& path,
   std::vector<std::string> part_files;
   const CellPlaces places = read_cell(document, config, part_files, findings);
   check_rules(config, places, findings);
-  const auto of_parts = read_parts(path, part_files, config, places, findings);
+  const auto of_parts = read_parts(path, part_files, parts, config, places, findings);
 
   auto all = findings.take();
   all.insert(all.end(), document.findings.begin(), document.findings.end());
@@ -247,6 +259,7 @@ Expected<Config, std::vector<Diagnostic>> load_document(const std::string& path,
   all.insert(all.end(), of_parts.begin(), of_parts.end());
   if (!all.empty()) return unexpected(std::move(all));
 
+  config.text = std::move(document.text);
   config.state_dir = resolved(path, config.state_dir);
   config.picture_dir = resolved(path, config.picture_dir);
   for (const auto& recipe : config.recipes) config.plc.part_ids.push_back(recipe.id);
@@ -276,6 +289,13 @@ Expected<Config, std::vector<Diagnostic>> load_text(const std::string& path, std
 }
 Expected<Part, std::vector<Diagnostic>> load_part_text(const std::string& path, std::string_view text) {
   return load_part_document(parse(path, text));
+}
+Expected<Config, std::vector<Diagnostic>> load_texts(const FileText& cell, std::span<const FileText> parts) {
+  const auto find = [&](const std::string& path) {
+    const auto part = std::find_if(parts.begin(), parts.end(), [&](const FileText& p) { return p.path == path; });
+    return part == parts.end() ? refused(path, "is not among the files that were kept") : parse(path, part->text);
+  };
+  return load_document(cell.path, parse(cell.path, cell.text), {find, MeshFile::OfNoMatter});
 }
 
 drivers::scanner::Options Config::scanner_options() const {
