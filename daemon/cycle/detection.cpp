@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <exception>
 
+#include "vision/kernels.hpp"
+
 namespace binpick::daemon {
 namespace {
 /// Less than this share of a part's smallest possible footprint (a square of a tenth of its diameter) is no part.
@@ -24,6 +26,7 @@ DetectResult look(const DetectRequest& request) {
   options.search = config.detection.search;
 
   DetectResult result;
+  result.loops = vision::kernels::table().name;
   result.report = vision::detect(request.image, box, part, options);
   auto& detections = result.report.detections;
   std::erase_if(detections, [&](const vision::Detection& d) { return d.score < recipe.score_min; });

@@ -25,6 +25,7 @@ struct DetectResult {
   vision::DetectionReport report;  ///< Only detections that reach the recipe's score_min stay in `detections`.
   vision::GraspChoice choice;
   vision::FillLevel fill;
+  std::string loops;          ///< The inner loops it ran on, by name: others differ in the last digits.
   bool supply_empty = false;  ///< Nothing lies in the supply that could be a part.
   std::string error;          ///< Not empty: detection itself failed; nothing else is valid.
 };
