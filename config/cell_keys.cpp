@@ -324,6 +324,25 @@ const std::vector<Section<Config>>& cell_sections() {
               return chosen(c.detection.search, {vision::Search::Exhaustive, vision::Search::Votes});
             }},
        }},
+      {"picks",
+       "How many picks one scan is good for, and what is remembered of those that failed.",
+       {
+           {{.name = "per_scan", .type = Integer, .min = 1, .max = 100, .default_value = "1",
+             .help = "Picks that are answered from one scan at most, the next ones at once and without a sweep. More than "
+                     "1 needs a PLC that raises new_scan when the supply was changed or moved."},
+            [](C& c) -> Slot { return &c.picks.per_scan; }},
+           {{.name = "scan_valid_ms", .type = Integer, .unit = "ms", .min = 1000, .max = 600000, .default_value = "60000",
+             .help = "An older scan is not used again."},
+            [](C& c) -> Slot { return &c.picks.scan_valid; }},
+           {{.name = "margin_mm", .type = Number, .unit = "mm", .min = 0, .max = 1000, .default_value = "10",
+             .help = "Seen from above, the next object stands so far apart from all that were picked from the scan: it "
+                     "has not moved with them."},
+            [](C& c) -> Slot { return &c.picks.margin_mm; }},
+           {{.name = "failed_scans", .type = Integer, .min = 0, .max = 1000, .default_value = "10",
+             .help = "For so many scans a failed pick is remembered: its object comes after all others, and is left alone "
+                     "when a second one has failed. 0: not at all."},
+            [](C& c) -> Slot { return &c.picks.failed_scans; }},
+       }},
   };
   return sections;
 }

@@ -62,6 +62,14 @@ struct Detection {
   vision::Search search = vision::Search::Exhaustive;
 };
 
+/// How far one scan goes.
+struct Picks {
+  int per_scan = 1;
+  std::chrono::milliseconds scan_valid{60000};
+  double margin_mm = 10;
+  int failed_scans = 10;
+};
+
 enum class ScannerModel { Lms400, Lps36, Lps36Hi };
 enum class Carrier { Pivot, Robot };
 
@@ -98,6 +106,7 @@ struct Config {
   std::vector<Recipe> recipes;
   vision::ReachLimits reach;
   Detection detection;
+  Picks picks;
   std::string picture_dir;  ///< A PNG per cycle goes here; empty: none.
   std::string state_dir;  ///< boot_count lives here.
 

@@ -250,57 +250,76 @@ void Cell::start_detection(TimePoint now) {
 }
 
 void Cell::publish(TimePoint now) {
-  const DetectResult result = std::move(*std::exchange(detect_result_, std::nullopt));
   const auto& supply = data_->config.supplies[supply_];
+  const bool new_scan = detect_result_.has_value();
+  if (new_scan) memory_.keep(place(), *std::exchange(detect_result_, std::nullopt), last_profile_at_);
+  const DetectResult& scan = memory_.scan(place());
+  const auto pick = memory_.next(place(), data_->config.picks, now);
 
   plc::PickResult answer;
   answer.part_id = request_.part_id;
-  answer.fill_level_percent = to_u16(100 * result.fill.share);
-  answer.figures.sweep_ms = to_u16(in_ms(sweep_done_.duration));
-  answer.figures.profiles = to_u16(static_cast<double>(sweep_done_.profiles));
-  answer.figures.points = static_cast<std::uint32_t>(builder_->points());
-  answer.figures.hypotheses = static_cast<std::uint32_t>(result.report.hypotheses);
-  answer.figures.detection_ms = to_u16(result.report.time_ms);
-
-  const std::size_t found = result.report.detections.size();
-  if (!result.choice.reachable.empty()) {
-    const auto& grasp = result.choice.reachable.front();
+  answer.fill_level_percent = to_u16(100 * scan.fill.share);
+  if (new_scan) {
+    answer.figures.sweep_ms = to_u16(in_ms(sweep_done_.duration));
+    answer.figures.profiles = to_u16(static_cast<double>(sweep_done_.profiles));
+    answer.figures.points = static_cast<std::uint32_t>(builder_->points());
+    answer.figures.hypotheses = static_cast<std::uint32_t>(scan.report.hypotheses);
+    answer.figures.detection_ms = to_u16(scan.report.time_ms);
+  }
+  const std::size_t found = scan.report.detections.size();
+  if (pick) {
+    const auto& grasp = scan.choice.reachable[pick->reachable];
     pick_id_ = pick_id_ == 65535 ? 1 : static_cast<std::uint16_t>(pick_id_ + 1);
     answer.code = plc::ResultCode::PickFound;
     answer.pick_id = pick_id_;
-    answer.objects_left = to_u16(static_cast<double>(found - 1));
-    answer.score = result.report.detections[grasp.detection].score;
+    answer.objects_left = to_u16(static_cast<double>(pick->left));
+    answer.score = scan.report.detections[grasp.detection].score;
     answer.T_base_approach = supply.T_base_supply * grasp.T_supply_approach;
     answer.T_base_grasp = supply.T_base_supply * grasp.T_supply_grasp;
+    memory_.answered(place(), *pick, pick_id_, data_->config.picks);
+    if (pick->again)
+      BINPICK_LOG(Info, "cell", "pick %u is a second try: a pick of object %zu failed before", pick_id_,
+                  grasp.detection);
     robot_.offer({answer.pick_id, request_.sequence, request_.part_id, answer.objects_left, answer.T_base_approach,
                   answer.T_base_grasp});
   } else {
     answer.objects_left = to_u16(static_cast<double>(found));
-    answer.code = found > 0             ? plc::ResultCode::NotReachable
-                  : result.supply_empty ? plc::ResultCode::SupplyEmpty
-                                        : plc::ResultCode::NothingFound;
+    answer.code = found > 0           ? plc::ResultCode::NotReachable
+                  : scan.supply_empty ? plc::ResultCode::SupplyEmpty
+                                      : plc::ResultCode::NothingFound;
     // The robot's codes for "no pick" are the PLC's result codes.
     robot_.withdraw(static_cast<drivers::robot::NoPick>(answer.code));
-    if (result.fill.measured < kMeasuredMin)
-      BINPICK_LOG(Warning, "cell", "cycle %llu: only %.0f %% of the supply was measured; %s",
-                  static_cast<unsigned long long>(cycle_id_), 100 * result.fill.measured,
-                  robot_carrier_
-                      ? "let the robot say begin and end where its path does, and move slower"
-                      : "clean the scanner's window, look at the sweep's angles and at what is dark or mirrors");
-    for (const auto& unreachable : result.choice.unreachable)
-      BINPICK_LOG(Info, "cell", "object %zu is not reachable: %s", unreachable.detection, unreachable.reason.c_str());
+    tell_why_none(scan);
   }
   plc_.publish(answer, now);
+  if (!new_scan) {
+    BINPICK_LOG(Info, "cell", "cycle %llu: pick %u from the scan before, score %.2f",
+                static_cast<unsigned long long>(cycle_id_), answer.pick_id, answer.score);
+    return;
+  }
   BINPICK_LOG(
       Info, "cell",
       "cycle %llu: result %u, pick %u, %zu found, score %.2f, %zu hypotheses, detection %.0f ms, last profile to "
       "answer %.0f ms",
       static_cast<unsigned long long>(cycle_id_), static_cast<unsigned>(answer.code), answer.pick_id, found,
-      answer.score, result.report.hypotheses, result.report.time_ms, in_ms(now - last_profile_at_));
+      answer.score, scan.report.hypotheses, scan.report.time_ms, in_ms(now - last_profile_at_));
+}
+
+void Cell::tell_why_none(const DetectResult& scan) const {
+  if (scan.fill.measured < kMeasuredMin)
+    BINPICK_LOG(Warning, "cell", "cycle %llu: only %.0f %% of the supply was measured; %s",
+                static_cast<unsigned long long>(cycle_id_), 100 * scan.fill.measured,
+                robot_carrier_
+                    ? "let the robot say begin and end where its path does, and move slower"
+                    : "clean the scanner's window, look at the sweep's angles and at what is dark or mirrors");
+  for (const auto& unreachable : scan.choice.unreachable)
+    BINPICK_LOG(Info, "cell", "object %zu is not reachable: %s", unreachable.detection, unreachable.reason.c_str());
+  for (const std::string& line : memory_.passed_over(place())) BINPICK_LOG(Info, "cell", "%s", line.c_str());
 }
 
 void Cell::stop_cycle(TimePoint now) {
   sweep_.abort(now);
+  memory_.forget_scans();
   // Only a move: a reference run would be broken off and put off for seconds, a faulted module would need one more
   // reset. A sweep has stopped its pivot by itself, in whatever state.
   if (pivot_.state() == drivers::pivot::Session::State::Moving) pivot_.stop(now);

@@ -9,6 +9,7 @@
 #include "base/clock.hpp"
 #include "daemon/cycle/cell_data.hpp"
 #include "daemon/cycle/detection.hpp"
+#include "daemon/pick_memory.hpp"
 #include "daemon/sequence.hpp"
 #include "drivers/pivot/session.hpp"
 #include "drivers/robot/session.hpp"
@@ -67,6 +68,8 @@ class Cell {
   void begin_sweep(TimePoint now);
   void start_detection(TimePoint now);
   void publish(TimePoint now);
+  void tell_why_none(const DetectResult& scan) const;
+  PickMemory::Place place() const { return {request_.supply_id, request_.part_id}; }
   void stop_cycle(TimePoint now);
   void put_in_force(TimePoint now);
   void update_ready(TimePoint now);
@@ -108,6 +111,7 @@ class Cell {
   std::uint16_t pick_id_ = 0;
   plc::Alarm cycle_alarm_ = plc::Alarm::None;  // why FaultCycle
   plc::PickRequest request_;
+  PickMemory memory_;
   std::size_t supply_ = 0, recipe_ = 0;  // indices of the running request
   std::optional<drivers::pivot::ModuleInfo> module_;
   std::optional<vision::DepthImageBuilder> builder_;

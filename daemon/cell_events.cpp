@@ -76,6 +76,11 @@ void Cell::on(const plc::Event& event, TimePoint now) {
                    BINPICK_LOG(Info, "cell", "cycle %llu: request %u for part %u in supply %u",
                                static_cast<unsigned long long>(cycle_id_), request_.sequence, request_.part_id,
                                request_.supply_id);
+                   if (request_.new_scan) memory_.forget(request_.supply_id);
+                   if (memory_.next(place(), data_->config.picks, now)) {
+                     plc_.on_scan_done(now);
+                     return apply(CellInput::KnownRequest, now);
+                   }
                    apply(CellInput::Request, now);
                    // A robot that carries the scanner is where it has to be.
                    if (plc_.robot_clear() || robot_carrier_) {
@@ -164,9 +169,12 @@ void Cell::on(const drivers::robot::Event& event, TimePoint now) {
                  },
                  [&](const drivers::robot::Reported& reported) {
                    BINPICK_LOG(Info, "robot", "pick %u %s", reported.pick_id, reported.done ? "done" : "failed");
-                   robot_.withdraw(drivers::robot::NoPick::NotReady);
+                   memory_.on_report(reported.pick_id, reported.done, data_->config.picks);
+                   // A late report must not take back the pick that was answered meanwhile.
+                   if (reported.pick_id == pick_id_) robot_.withdraw(drivers::robot::NoPick::NotReady);
                  },
                  [&](const drivers::robot::Lost& lost) {
+                   memory_.forget_scans();
                    BINPICK_LOG(Warning, "robot", "lost: %s; start the robot's program and check the network",
                                lost.text.c_str());
                    robot_lost_ = true;
@@ -178,51 +186,51 @@ void Cell::on(const drivers::robot::Event& event, TimePoint now) {
 }
 
 void Cell::on(drivers::sweep::Event& event, TimePoint now) {
-  std::visit(
-      Overloaded{
-          [&](const drivers::sweep::RegisteredProfile& registered) {
-            if (state_ != CellState::Sweeping) return;
-            const auto& config = data_->config;
-            const auto T_base_scanner = scanner_at(config, registered.carrier);
-            const auto T_supply_scanner = config.supplies[supply_].T_base_supply.inverse() * T_base_scanner;
-            points_supply_mm_.clear();
-            vision::register_profile(registered.profile.x_mm, registered.profile.z_mm, T_supply_scanner,
-                                     points_supply_mm_);
-            builder_->add(points_supply_mm_);
-          },
-          [&](const drivers::sweep::Done& done) {
-            sweep_done_ = done;
-            if (done.profiles_lost > 0) {
-              BINPICK_LOG(Warning, "scanner", "%llu profiles lost in the sweep; check the network to the scanner",
-                          static_cast<unsigned long long>(done.profiles_lost));
-              plc_.raise(plc::Alarm::ScannerProfilesLost, now);
-            } else {
-              plc_.clear(plc::Alarm::ScannerProfilesLost, now);
-            }
-            if (done.profiles_without_pose > 0)
-              BINPICK_LOG(Warning, "cell",
-                          "cycle %llu: %zu profiles left out, where the scanner was is not known of them",
-                          static_cast<unsigned long long>(cycle_id_), done.profiles_without_pose);
-            apply(CellInput::SweepDone, now);
-          },
-          [&](const drivers::sweep::Failed& failed) {
-            using Device = drivers::sweep::Failed::Device;
-            const auto of = [](const std::optional<Trouble>& trouble, plc::Alarm otherwise) {
-              return trouble ? trouble->alarm : otherwise;
-            };
-            cycle_alarm_ = failed.device == Device::Poses
-                               ? (robot_carrier_ ? plc::Alarm::RobotPosesLost : plc::Alarm::PivotNoReply)
-                           : failed.device == Device::Carrier && robot_carrier_
-                               ? of(poses_trouble_, plc::Alarm::RobotPathBroken)
-                           : failed.device == Device::Carrier ? of(pivot_trouble_, plc::Alarm::PivotModuleError)
-                           : failed.device == Device::Scanner ? of(scanner_trouble_, plc::Alarm::ScannerNoReply)
-                           : robot_carrier_                   ? plc::Alarm::RobotPathBroken
-                                                              : plc::Alarm::ScanTimeout;
-            BINPICK_LOG(Warning, "cell", "cycle %llu: sweep failed: %s", static_cast<unsigned long long>(cycle_id_),
-                        failed.text.c_str());
-            apply(CellInput::SweepFailed, now);
-          },
-      },
-      event);
+  std::visit(Overloaded{
+                 [&](const drivers::sweep::RegisteredProfile& registered) {
+                   if (state_ != CellState::Sweeping) return;
+                   const auto& config = data_->config;
+                   const auto T_base_scanner = scanner_at(config, registered.carrier);
+                   const auto T_supply_scanner = config.supplies[supply_].T_base_supply.inverse() * T_base_scanner;
+                   points_supply_mm_.clear();
+                   vision::register_profile(registered.profile.x_mm, registered.profile.z_mm, T_supply_scanner,
+                                            points_supply_mm_);
+                   builder_->add(points_supply_mm_);
+                 },
+                 [&](const drivers::sweep::Done& done) {
+                   sweep_done_ = done;
+                   if (done.profiles_lost > 0) {
+                     BINPICK_LOG(Warning, "scanner",
+                                 "%llu profiles lost in the sweep; check the network to the scanner",
+                                 static_cast<unsigned long long>(done.profiles_lost));
+                     plc_.raise(plc::Alarm::ScannerProfilesLost, now);
+                   } else {
+                     plc_.clear(plc::Alarm::ScannerProfilesLost, now);
+                   }
+                   if (done.profiles_without_pose > 0)
+                     BINPICK_LOG(Warning, "cell",
+                                 "cycle %llu: %zu profiles left out, where the scanner was is not known of them",
+                                 static_cast<unsigned long long>(cycle_id_), done.profiles_without_pose);
+                   apply(CellInput::SweepDone, now);
+                 },
+                 [&](const drivers::sweep::Failed& failed) {
+                   using Device = drivers::sweep::Failed::Device;
+                   const auto of = [](const std::optional<Trouble>& trouble, plc::Alarm otherwise) {
+                     return trouble ? trouble->alarm : otherwise;
+                   };
+                   cycle_alarm_ = failed.device == Device::Poses
+                                      ? (robot_carrier_ ? plc::Alarm::RobotPosesLost : plc::Alarm::PivotNoReply)
+                                  : failed.device == Device::Carrier && robot_carrier_
+                                      ? of(poses_trouble_, plc::Alarm::RobotPathBroken)
+                                  : failed.device == Device::Carrier ? of(pivot_trouble_, plc::Alarm::PivotModuleError)
+                                  : failed.device == Device::Scanner ? of(scanner_trouble_, plc::Alarm::ScannerNoReply)
+                                  : robot_carrier_                   ? plc::Alarm::RobotPathBroken
+                                                                     : plc::Alarm::ScanTimeout;
+                   BINPICK_LOG(Warning, "cell", "cycle %llu: sweep failed: %s",
+                               static_cast<unsigned long long>(cycle_id_), failed.text.c_str());
+                   apply(CellInput::SweepFailed, now);
+                 },
+             },
+             event);
 }
 }  // namespace binpick::daemon

@@ -14,6 +14,7 @@ enum class CellState {
 };
 enum class CellInput {
   Request,       ///< The PLC's request was accepted.
+  KnownRequest,  ///< The same, and the last scan of the supply holds another pick for it.
   RobotClear,    ///< The robot is out of the view.
   RobotEntered,  ///< The robot came into the view.
   SweepDone,
@@ -40,6 +41,7 @@ struct CellRow {
 
 inline constexpr std::array kCellRows{
     CellRow{CellState::Idle, CellInput::Request, CellState::AwaitingClear, CellEffect::None},
+    CellRow{CellState::Idle, CellInput::KnownRequest, CellState::Idle, CellEffect::Publish},
     CellRow{CellState::AwaitingClear, CellInput::RobotClear, CellState::Sweeping, CellEffect::BeginSweep},
     CellRow{CellState::AwaitingClear, CellInput::DeviceLost, CellState::Idle, CellEffect::FaultCycle},
     CellRow{CellState::AwaitingClear, CellInput::Cancelled, CellState::Idle, CellEffect::StopQuietly},

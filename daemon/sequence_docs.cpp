@@ -23,6 +23,8 @@ const char* name(CellInput input) {
   switch (input) {
     case CellInput::Request:
       return "request accepted";
+    case CellInput::KnownRequest:
+      return "request accepted, the last scan holds another pick";
     case CellInput::RobotClear:
       return "robot clear of the view";
     case CellInput::RobotEntered:

@@ -62,7 +62,9 @@ class Core {
   void on_request_level(TimePoint now);
   Signal classify(const PickRequest& request);
   bool raised(std::uint16_t bit) const { return (word(at("control")) & bit) != 0; }
-  PickRequest request_in_words() const { return {word(at("sequence")), word(at("part_id")), word(at("supply_id"))}; }
+  PickRequest request_in_words() const {
+    return {word(at("sequence")), word(at("part_id")), word(at("supply_id")), raised(control::kNewScan)};
+  }
 
   // The handshake.
   void apply(Signal signal, TimePoint now);

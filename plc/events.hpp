@@ -12,6 +12,7 @@ struct PickRequest {
   std::uint16_t sequence = 0;  ///< 1 … 65535.
   std::uint16_t part_id = 0;
   std::uint16_t supply_id = 0;
+  bool new_scan = false;  ///< What is known of the supply does not hold any more.
 };
 
 /// How the cycle went, in numbers; they stand in the result block for whoever wants to draw them.

@@ -19,6 +19,8 @@ constexpr std::array kVariables{
     Variable{"abort", Role::Input, Kind::Bool, "Stop and forget the running cycle."},
     Variable{"reset", Role::Input, Kind::Bool, "Go on after a fault; clears the alarm list."},
     Variable{"robot_clear", Role::Input, Kind::Bool, "The robot is out of the scanner's view."},
+    Variable{"new_scan", Role::Input, Kind::Bool,
+             "The supply was changed or moved: the next answer comes from a new scan."},
     Variable{"skip_pick", Role::Input, Kind::Bool,
              "The robot will not fetch the last pick: do not wait until it has gone in."},
     Variable{"part_id", Role::Input, Kind::Number, "id of a [[part]] of the cell file."},

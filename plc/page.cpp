@@ -217,7 +217,9 @@ a second), and read words 8 … 81 in every poll. All signals are levels: hold e
    comes earlier waits with `robot_clear` = 0 until `plc.scan_timeout_ms` has passed, and a sweep into which the robot moves
    (`robot_clear` falls) is broken off: both are a fault with alarm 502.
 5. Choose `sequence`: the last one plus 1 (65535 is followed by 1, never 0), and not equal to `ack_sequence`. Set `part_id`,
-   `supply_id`, `result_ack` = 0 and the bit `request` (bit 0), all in the same write.
+   `supply_id`, `result_ack` = 0 and the bit `request` (bit 0), all in the same write. **When the supply was changed or moved since
+   its last request, set `new_scan` (bit 4) with it**: with `picks.per_scan` over 1 the answer may else come from the scan before,
+   at once and without a sweep. A fault, an abort of a running cycle and a lost robot make the next scan a new one by themselves.
 6. Wait until `ack` (bit 1) is 1 and `ack_sequence` is your number; then clear `request`.
 7. When `scan_done` (bit 4) is 1, the robot may enter the view.
 8. Wait until `result_valid` (bit 3) is 1 and both `result_sequence` and `result_sequence_tail` are your number. If `fault` (bit 5)

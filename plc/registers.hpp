@@ -117,7 +117,8 @@ inline constexpr std::array kRegisters{
 
 /// Bits of `control`. Levels, never pulses: hold each until its acknowledge is seen.
 namespace control {
-inline constexpr std::uint16_t kRequest = 1 << 0, kAbort = 1 << 1, kReset = 1 << 2, kRobotClear = 1 << 3;
+inline constexpr std::uint16_t kRequest = 1 << 0, kAbort = 1 << 1, kReset = 1 << 2, kRobotClear = 1 << 3,
+                               kNewScan = 1 << 4;
 }
 inline constexpr std::array kControlBits{
     Bit{0, "request", "A pick is wanted. Raise with or after the rest of the block, drop when ack is seen."},
@@ -128,6 +129,10 @@ inline constexpr std::array kControlBits{
     Bit{3, "robot_clear",
         "The robot is out of the scanner's view. No sweep is made while this is 0, unless the robot carries the "
         "scanner."},
+    Bit{4, "new_scan",
+        "With a request: the supply was changed or moved, what is known of it does not hold. Without it, the answer "
+        "may "
+        "come from the scan before (picks.per_scan)."},
 };
 
 /// Bits of `status`.

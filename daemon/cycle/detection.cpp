@@ -35,6 +35,15 @@ DetectResult look(const DetectRequest& request) {
   if (recipe.tilt_max_rad) limits.tilt_max_rad = *recipe.tilt_max_rad;
   result.choice = vision::choose_grasps(result.report, part.symmetry(), recipe.part.grasps, box, limits);
 
+  Eigen::AlignedBox3f extents;
+  for (const auto& vertex : part.mesh().vertices_mm) extents.extend(vertex);
+  result.part_width_mm = static_cast<double>(extents.sizes().minCoeff());
+  const Eigen::Vector3d centroid_mm = part.mesh().centroid_mm();
+  for (const auto& detection : detections) {
+    result.footprints.push_back(vision::footprint_of(part.mesh().vertices_mm, detection.T_supply_object.iso));
+    result.centres_mm.push_back(detection.T_supply_object * centroid_mm);
+  }
+
   result.fill = vision::fill_level(request.image, box, part.noise_mm());
   result.supply_empty =
       detections.empty() && result.fill.measured > 0.3 && result.fill.occupied_mm2 < smallest_footprint_mm2(part);

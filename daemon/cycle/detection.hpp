@@ -3,11 +3,13 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "daemon/cycle/cell_data.hpp"
 #include "vision/depth_image.hpp"
 #include "vision/detector.hpp"
 #include "vision/fill_level.hpp"
+#include "vision/footprint.hpp"
 #include "vision/grasp.hpp"
 
 namespace binpick::daemon {
@@ -24,6 +26,10 @@ struct DetectResult {
   std::uint64_t cycle_id = 0;      ///< A result of an abandoned cycle is dropped by it.
   vision::DetectionReport report;  ///< Only detections that reach the recipe's score_min stay in `detections`.
   vision::GraspChoice choice;
+  /// Of each detection: what it covers of the floor, and the middle of its surface (supply frame).
+  std::vector<vision::Footprint> footprints;
+  std::vector<Eigen::Vector3d> centres_mm;
+  double part_width_mm = 0;  ///< The part's smallest extent along its own axes.
   vision::FillLevel fill;
   std::string loops;          ///< The inner loops it ran on, by name: others differ in the last digits.
   bool supply_empty = false;  ///< Nothing lies in the supply that could be a part.

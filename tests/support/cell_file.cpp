@@ -62,7 +62,8 @@ std::string to_toml(const CellFile& file) {
     out << (file.robot == "ur" ? "pose_address" : "pose_listen") << " = \"127.0.0.1:" << file.pose_port
         << "\"\npose_latency_ms = " << file.pose_latency_ms << "\n";
   out << "\n[reach]\ntilt_max_deg = " << file.tilt_max_deg << "\n\n[detection]\nthreads = 2\ndeadline_ms = 4500\n\n"
-      << "[[supply]]\nid = 1\nname = \"lattice box\"\nsize_mm = " << layout.size_mm << "\n"
+      << "[picks]\nper_scan = " << file.picks_per_scan
+      << "\n\n[[supply]]\nid = 1\nname = \"lattice box\"\nsize_mm = " << layout.size_mm << "\n"
       << "T_base_supply = { xyz_mm = [1200, 0, 0], rpy_deg = [0, 0, 0] }\n";
   if (file.scan_path != 0)
     out << "scan_path = " << file.scan_path << "\npath_timeout_ms = 4500\n";

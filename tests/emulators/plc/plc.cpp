@@ -71,6 +71,7 @@ std::array<std::uint16_t, plc::kRequestLength> Plc::request_words() const {
   set(abort_, plc::control::kAbort);
   set(reset_, plc::control::kReset);
   set(robot_clear_ && !picking_, plc::control::kRobotClear);
+  set(request_ && new_scan_, plc::control::kNewScan);
   return {heartbeat_, sequence_, part_id_, supply_id_, result_ack_, 0, 0, control};
 }
 

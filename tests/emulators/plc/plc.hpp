@@ -79,6 +79,7 @@ class Plc {
   void raise_abort();     ///< Dropped by itself when acknowledged.
   void raise_reset();     ///< Likewise.
   void set_robot_clear(bool clear) { robot_clear_ = clear; }
+  void set_new_scan(bool wanted) { new_scan_ = wanted; }  ///< With every request while it is set.
   void set_automatic(bool automatic) { options_.automatic = automatic; }
   void set_next(std::uint16_t part_id, std::uint16_t supply_id) {
     options_.part_id = part_id, options_.supply_id = supply_id;
@@ -160,6 +161,7 @@ class Plc {
   Step step_ = Step::Idle;
   std::uint16_t heartbeat_ = 0, sequence_ = 0, part_id_ = 0, supply_id_ = 0, result_ack_ = 0;
   bool request_ = false, abort_ = false, reset_ = false, robot_clear_ = true, picking_ = false;
+  bool new_scan_ = false;
   bool read_once_ = false, shown_zero_ = false;
   bool again_ = false;  // the last request, once it may be raised
   bool told_ = false;   // as a server: the cell has written its blocks

@@ -39,9 +39,9 @@ TEST(CellSequence, EveryRunningStateCanBeCancelledAndStopsThePivot) {
   }
 }
 
-TEST(CellSequence, OnlyADoneDetectionPublishes) {
+TEST(CellSequence, OnlyADoneDetectionOrAKnownScanPublishes) {
   for (const auto& row : daemon::kCellRows)
-    if (row.effect == daemon::CellEffect::Publish) {
+    if (row.effect == daemon::CellEffect::Publish && row.on != daemon::CellInput::KnownRequest) {
       EXPECT_EQ(row.from, daemon::CellState::Detecting);
       EXPECT_EQ(row.on, daemon::CellInput::DetectionDone);
     }

@@ -1,0 +1,103 @@
+#include "daemon/pick_memory.hpp"
+
+#include <algorithm>
+#include <cstdio>
+
+namespace binpick::daemon {
+namespace {
+/// Nearer than this share of its smallest extent, an object that was seen again is the same one.
+constexpr double kSameShare = 0.5;
+constexpr int kPicksMax = 2;  ///< Of one object that fail, before it is left alone.
+}  // namespace
+
+void PickMemory::keep(const Place& place, DetectResult result, TimePoint scanned_at) {
+  scans_[place.supply_id] = Scan{place.part_id, std::move(result), scanned_at, {}};
+  auto& failures = failures_[place];
+  std::erase_if(failures, [](Failure& failure) { return failure.scans_left-- <= 0; });
+}
+
+int PickMemory::failures_of(const Place& place, const Eigen::Vector3d& centre_mm) const {
+  const auto known = failures_.find(place);
+  if (known == failures_.end()) return 0;
+  int most = 0;
+  for (const Failure& failure : known->second)
+    if ((failure.centre_mm - centre_mm).norm() < failure.radius_mm) most = std::max(most, failure.picks);
+  return most;
+}
+
+std::optional<PickMemory::Pick> PickMemory::next(const Place& place, const config::Picks& options,
+                                                 TimePoint now) const {
+  const auto kept = scans_.find(place.supply_id);
+  if (kept == scans_.end() || kept->second.part_id != place.part_id) return std::nullopt;
+  const Scan& scan = kept->second;
+  const bool fresh = scan.picked.empty();
+  if (!fresh &&
+      (scan.picked.size() >= static_cast<std::size_t>(options.per_scan) || now - scan.at > options.scan_valid))
+    return std::nullopt;
+  const std::size_t left = scan.result.report.detections.size() - scan.picked.size() - 1;
+  std::optional<Pick> again;
+  for (std::size_t i = 0; i < scan.result.choice.reachable.size(); ++i) {
+    const std::size_t detection = scan.result.choice.reachable[i].detection;
+    const auto& footprints = scan.result.footprints;
+    const bool stands_apart = std::ranges::all_of(scan.picked, [&](std::size_t picked) {
+      return picked != detection && vision::gap_mm(footprints[picked], footprints[detection]) >= options.margin_mm;
+    });
+    if (!stands_apart) continue;
+    const int failures = failures_of(place, scan.result.centres_mm[detection]);
+    if (failures == 0) return Pick{i, false, left};
+    if (fresh && failures < kPicksMax && !again) again = Pick{i, true, left};
+  }
+  return again;
+}
+
+void PickMemory::answered(const Place& place, const Pick& pick, std::uint16_t pick_id, const config::Picks& options) {
+  Scan& scan = scans_.at(place.supply_id);
+  const std::size_t detection = scan.result.choice.reachable[pick.reachable].detection;
+  scan.picked.push_back(detection);
+  open_ =
+      Open{pick_id, place,
+           Failure{scan.result.centres_mm[detection], kSameShare * scan.result.part_width_mm, 1, options.failed_scans}};
+}
+
+void PickMemory::on_report(std::uint16_t pick_id, bool done, const config::Picks& options) {
+  if (!open_ || open_->pick_id != pick_id) {
+    if (!done) forget_scans();  // of a pick of long ago
+    return;
+  }
+  const Open open = *std::exchange(open_, std::nullopt);
+  if (done) return;
+  scans_.erase(open.place.supply_id);
+  auto& failures = failures_[open.place];
+  const auto same = std::ranges::find_if(failures, [&](const Failure& failure) {
+    return (failure.centre_mm - open.would_be.centre_mm).norm() < failure.radius_mm;
+  });
+  if (same == failures.end()) {
+    if (options.failed_scans > 0) failures.push_back(open.would_be);
+    return;
+  }
+  ++same->picks;
+  same->scans_left = options.failed_scans;
+  same->centre_mm = open.would_be.centre_mm;  // it was pushed, perhaps
+}
+
+std::vector<std::string> PickMemory::passed_over(const Place& place) const {
+  std::vector<std::string> lines;
+  const auto kept = scans_.find(place.supply_id);
+  if (kept == scans_.end() || kept->second.part_id != place.part_id) return lines;
+  const DetectResult& result = kept->second.result;
+  for (const auto& reachable : result.choice.reachable) {
+    const int failures = failures_of(place, result.centres_mm[reachable.detection]);
+    if (failures == 0) continue;
+    char text[120];
+    std::snprintf(text, sizeof text, "object %zu is passed over: %d pick%s of it failed", reachable.detection, failures,
+                  failures == 1 ? "" : "s");
+    lines.emplace_back(text);
+  }
+  return lines;
+}
+
+void PickMemory::forget(std::uint16_t supply_id) {
+  scans_.erase(supply_id);
+  std::erase_if(failures_, [&](const auto& known) { return known.first.supply_id == supply_id; });
+}
+}  // namespace binpick::daemon

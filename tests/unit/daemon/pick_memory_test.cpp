@@ -1,0 +1,129 @@
+#include "daemon/pick_memory.hpp"
+
+#include <gtest/gtest.h>
+
+namespace binpick::daemon {
+namespace {
+using namespace std::chrono_literals;
+constexpr PickMemory::Place kPlace{1, 7};
+constexpr TimePoint kScanned{100s};
+
+/// Objects of 20 × 20 mm in a row, at these x; the best first.
+DetectResult scan_of(std::initializer_list<double> xs) {
+  DetectResult result;
+  result.part_width_mm = 20;
+  for (const double x : xs) {
+    vision::Detection detection;
+    detection.score = 0.9;
+    result.choice.reachable.push_back(
+        {.detection = result.report.detections.size(), .T_supply_grasp = {}, .T_supply_approach = {}});
+    result.report.detections.push_back(detection);
+    result.centres_mm.emplace_back(x, 0, 10);
+    result.footprints.push_back({{{x - 10, -10}, {x + 10, -10}, {x + 10, 10}, {x - 10, 10}}});
+  }
+  return result;
+}
+
+struct PickMemoryTest : testing::Test {
+  PickMemory memory;
+  config::Picks options{.per_scan = 3, .scan_valid = 60s, .margin_mm = 5, .failed_scans = 4};
+  std::uint16_t id = 100;
+
+  void scan(std::initializer_list<double> xs) { memory.keep(kPlace, scan_of(xs), kScanned); }
+  std::optional<std::size_t> pick(TimePoint now = kScanned) {
+    const auto next = memory.next(kPlace, options, now);
+    if (!next) return std::nullopt;
+    memory.answered(kPlace, *next, ++id, options);
+    return next->reachable;
+  }
+  void fail() { memory.on_report(id, false, options); }
+  void done() { memory.on_report(id, true, options); }
+};
+}  // namespace
+
+TEST_F(PickMemoryTest, OneScanGivesWhatStandsApart) {
+  scan({0, 22, 100, 50});  // the second touches the first's margin
+  EXPECT_EQ(memory.next(kPlace, options, kScanned)->left, 3);
+  EXPECT_EQ(pick(), 0);
+  done();
+  EXPECT_EQ(memory.next(kPlace, options, kScanned)->left, 2);
+  EXPECT_EQ(pick(), 2);
+  EXPECT_EQ(pick(), 3) << "also while the robot is on its way";
+  EXPECT_EQ(pick(), std::nullopt);
+}
+
+TEST_F(PickMemoryTest, NoMoreThanItIsAllowed) {
+  options.per_scan = 1;
+  scan({0, 100});
+  EXPECT_EQ(pick(), 0);
+  EXPECT_EQ(pick(), std::nullopt);
+  options.per_scan = 2;
+  EXPECT_EQ(pick(kScanned + 61s), std::nullopt) << "too old";
+  EXPECT_EQ(pick(kScanned + 60s), 1);
+}
+
+TEST_F(PickMemoryTest, OfThatSupplyAndPartOnly) {
+  scan({0, 100});
+  pick();
+  EXPECT_FALSE(memory.next({1, 8}, options, kScanned));
+  EXPECT_FALSE(memory.next({2, 7}, options, kScanned));
+  memory.forget(2);
+  EXPECT_TRUE(memory.next(kPlace, options, kScanned));
+  memory.forget(1);
+  EXPECT_FALSE(memory.next(kPlace, options, kScanned));
+}
+
+TEST_F(PickMemoryTest, AFailedPickEndsItsScanAndComesLastInTheNext) {
+  scan({0, 100, 200});
+  pick();
+  fail();
+  EXPECT_EQ(pick(), std::nullopt);
+  scan({3, 100, 200});  // pushed a little
+  EXPECT_EQ(pick(), 1);
+  done();
+  EXPECT_EQ(pick(), 2);
+  done();
+  EXPECT_EQ(pick(), std::nullopt) << "a second try wants a new scan";
+  scan({3});
+  const auto again = memory.next(kPlace, options, kScanned);
+  ASSERT_TRUE(again);
+  EXPECT_TRUE(again->again);
+}
+
+TEST_F(PickMemoryTest, WhatFailedTwiceIsLeftAloneUntilItIsForgotten) {
+  scan({0});
+  pick();
+  fail();
+  scan({0});
+  EXPECT_EQ(pick(), 0);
+  fail();
+  for (int scans = 0; scans < options.failed_scans; ++scans) {
+    scan({0, 100});
+    EXPECT_EQ(memory.passed_over(kPlace).size(), 1);
+    EXPECT_EQ(pick(), 1);
+    done();
+  }
+  scan({0});
+  EXPECT_EQ(pick(), 0);
+}
+
+TEST_F(PickMemoryTest, WithoutMemoryTheSameOneIsTriedAgainAndAgain) {
+  options.failed_scans = 0;
+  for (int round = 0; round < 5; ++round) {
+    scan({0, 100});
+    EXPECT_EQ(pick(), 0);
+    fail();
+  }
+}
+
+TEST_F(PickMemoryTest, AReportOfAnotherPickSaysNothingOfThisOne) {
+  scan({0, 100});
+  pick();
+  memory.on_report(5, true, options);
+  EXPECT_EQ(pick(), 1);
+  memory.on_report(5, false, options);
+  EXPECT_EQ(pick(), std::nullopt) << "something was pushed somewhere";
+  scan({0, 100});
+  EXPECT_EQ(pick(), 0) << "and nobody knows of which object";
+}
+}  // namespace binpick::daemon
