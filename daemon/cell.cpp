@@ -277,6 +277,7 @@ void Cell::publish(TimePoint now) {
     answer.T_base_approach = supply.T_base_supply * grasp.T_supply_approach;
     answer.T_base_grasp = supply.T_base_supply * grasp.T_supply_grasp;
     memory_.answered(place(), *pick, pick_id_, data_->config.picks);
+    unfetched_since_ = new_scan ? std::optional{last_profile_at_} : std::nullopt;
     if (pick->again)
       BINPICK_LOG(Info, "cell", "pick %u is a second try: a pick of object %zu failed before", pick_id_,
                   grasp.detection);

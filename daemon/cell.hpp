@@ -118,6 +118,7 @@ class Cell {
   std::vector<Eigen::Vector3f> points_supply_mm_;  // reused from profile to profile
   drivers::sweep::Done sweep_done_;
   TimePoint request_at_, last_profile_at_;
+  std::optional<TimePoint> unfetched_since_;  ///< Of a pick from a new scan, until the robot has it: its last profile.
   std::optional<DetectRequest> detect_request_;
   std::optional<DetectResult> detect_result_;
 };

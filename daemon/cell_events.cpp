@@ -165,7 +165,12 @@ void Cell::on(const drivers::robot::Event& event, TimePoint now) {
                    robot_lost_ = false;
                  },
                  [&](const drivers::robot::Fetched& fetched) {
-                   BINPICK_LOG(Info, "robot", "pick %u fetched", fetched.pick_id);
+                   if (const auto from = std::exchange(unfetched_since_, std::nullopt);
+                       from && fetched.pick_id == pick_id_)
+                     BINPICK_LOG(Info, "robot", "pick %u fetched, %.0f ms after the last profile", fetched.pick_id,
+                                 in_ms(now - *from));
+                   else
+                     BINPICK_LOG(Info, "robot", "pick %u fetched", fetched.pick_id);
                  },
                  [&](const drivers::robot::Reported& reported) {
                    BINPICK_LOG(Info, "robot", "pick %u %s", reported.pick_id, reported.done ? "done" : "failed");
