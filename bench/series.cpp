@@ -1,12 +1,13 @@
 #include <algorithm>
+#include <charconv>
 #include <cstdio>
-#include <cstdlib>
 #include <exception>
 #include <filesystem>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
 /// A bin being emptied, as one picture: the first, the last and evenly chosen ones between of the pictures that a
@@ -57,7 +58,9 @@ int main(int argc, char** argv) try {
     return 2;
   }
   const auto files = pictures_in(argv[1]);
-  const int count = std::atoi(argv[2]);
+  const std::string_view wanted = argv[2];
+  int count = 0;
+  std::from_chars(wanted.data(), wanted.data() + wanted.size(), count);
   if (files.empty() || count < 1) {
     std::fprintf(stderr, "series: %s has no pictures, or \"%s\" is no number\n", argv[1], argv[2]);
     return 2;

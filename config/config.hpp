@@ -19,6 +19,7 @@
 #include "vision/gripper.hpp"
 #include "vision/knowledge_base.hpp"
 #include "vision/registration.hpp"
+#include "vision/supply_place.hpp"
 
 /// The cell file as values: what `binpick check` validates and the daemon runs on.
 namespace binpick::config {
@@ -27,6 +28,9 @@ struct Supply {
   std::string name;
   Eigen::Vector3d size_mm = Eigen::Vector3d::Zero();  ///< Inner x, y, wall height.
   Transform<frame::Base, frame::Supply> T_base_supply;
+  /// It is found by its rim in each scan, at most so far from T_base_supply.
+  bool locate = false;
+  vision::SupplyPlaceLimits place_limits;
   /// The sweep over it.
   Angle sweep_start, sweep_end;
   double sweep_speed_rad_s = 0.5;

@@ -277,9 +277,10 @@ Expected<Part, std::vector<Diagnostic>> load_part_document(Document document) {
 
 bool operator==(const Supply& a, const Supply& b) {
   return a.id == b.id && a.name == b.name && a.size_mm == b.size_mm &&
-         a.T_base_supply.iso.matrix() == b.T_base_supply.iso.matrix() && a.sweep_start == b.sweep_start &&
-         a.sweep_end == b.sweep_end && a.sweep_speed_rad_s == b.sweep_speed_rad_s && a.scan_path == b.scan_path &&
-         a.path_timeout == b.path_timeout;
+         a.T_base_supply.iso.matrix() == b.T_base_supply.iso.matrix() && a.locate == b.locate &&
+         a.place_limits.offset_mm == b.place_limits.offset_mm && a.place_limits.turn_rad == b.place_limits.turn_rad &&
+         a.sweep_start == b.sweep_start && a.sweep_end == b.sweep_end && a.sweep_speed_rad_s == b.sweep_speed_rad_s &&
+         a.scan_path == b.scan_path && a.path_timeout == b.path_timeout;
 }
 
 Expected<Config, std::vector<Diagnostic>> load(const std::string& path) { return load_document(path, open(path)); }

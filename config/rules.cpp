@@ -220,6 +220,20 @@ void check_reach(const Config& c, const CellPlaces& at, Findings& findings) {
                      "; use more, or 0 for no limit");
 }
 
+void check_sizes(const Config& c, const CellPlaces& at, Findings& findings) {
+  for (std::size_t i = 0; i < c.supplies.size(); ++i) {
+    const Eigen::Vector3d& size = c.supplies[i].size_mm;
+    if (!at.supplies[i].given("size_mm")) continue;
+    if (size.head<2>().minCoeff() < 10)
+      findings.add(at.supplies[i].of("size_mm"), "supply.size_mm is less than 10 mm along x or y; give mm");
+    if (c.supplies[i].locate && size.z() < 20)
+      findings.add(
+          at.supplies[i].of("locate"),
+          "supply.locate looks for a rim, and supply.size_mm gives no walls of 20 mm or more; give their height, "
+          "or leave locate out");
+  }
+}
+
 template <class Entry>
 void check_ids(const std::vector<Entry>& entries, const std::vector<Places>& places, const std::string& section,
                Findings& findings) {
@@ -260,6 +274,7 @@ void check_rules(const Config& config, const CellPlaces& places, Findings& findi
   check_sweeps(config, places, findings);
   check_views(config, places, findings);
   check_reach(config, places, findings);
+  check_sizes(config, places, findings);
   check_ids(config.supplies, places.supplies, "supply", findings);
   check_ids(config.recipes, places.parts, "part", findings);
 }

@@ -221,6 +221,7 @@ the fixed axes x, then y, then z, in degrees. `T_a_b` maps coordinates in b to c
 - Where the robot carries the scanner, `robot.listen` and `robot.pose_address` (ur) or `robot.pose_listen` (fanuc, kawasaki)
   are given, and `supply.path_timeout_ms` is less than `plc.scan_timeout_ms` and `robot.silence_max_s`.
 - In the middle of a sweep the scanner's middle ray goes down into the supply, or at most half its size beside it.
+- `supply.size_mm` is at least 10 mm along x and y; `supply.locate` needs walls of at least 20 mm.
 - `reach.radius_max_mm` is 0 or more than `reach.axis_min_mm`.
 - Ids differ among supplies and among parts.
 - Part files and their meshes exist; a part that is picked has at least one grasp.

@@ -131,6 +131,12 @@ void Cell::on_detect_result(DetectResult result, TimePoint now) {
     apply(CellInput::DetectionFailed, now);
     return;
   }
+  if (!result.not_located.empty()) {
+    cycle_alarm_ = plc::Alarm::SupplyNotFound;
+    BINPICK_LOG(Warning, "cell", "cycle %llu: %s", static_cast<unsigned long long>(cycle_id_),
+                result.not_located.c_str());
+    return apply(CellInput::DetectionFailed, now);
+  }
   detect_result_ = std::move(result);
   apply(CellInput::DetectionDone, now);
 }
@@ -219,6 +225,7 @@ void Cell::begin_sweep(TimePoint now) {
   const auto& part = data_->knowledge_bases[recipe_];
   const Eigen::Vector2d half = supply.size_mm.head<2>() / 2;
   builder_.emplace(part.pixel_mm(), -half, half);
+  points_said_mm_.clear();
   pivot_carrier_.set_latency(data_->config.pivot_latency);
   if (robot_carrier_) robot_carrier_->set_latency(data_->config.pose_latency);
   sweep_.begin({.motion = motion_over(supply), .scanner_latency = data_->config.scanner_latency}, now);
@@ -239,7 +246,10 @@ void Cell::start_detection(TimePoint now) {
   plc_.on_scan_done(now);
   DetectRequest request;
   request.cycle_id = cycle_id_;
-  request.image = builder_->image();
+  if (data_->config.supplies[supply_].locate)
+    request.points_said_mm = std::move(points_said_mm_);
+  else
+    request.image = builder_->image();
   request.cell = data_;
   request.supply = supply_;
   request.recipe = recipe_;
@@ -267,6 +277,13 @@ void Cell::publish(TimePoint now) {
     answer.figures.detection_ms = to_u16(scan.report.time_ms);
   }
   const std::size_t found = scan.report.detections.size();
+  if (new_scan && supply.locate) {
+    const Eigen::Vector3d offset_mm = scan.place.T_said_found.translation();
+    BINPICK_LOG(Info, "cell",
+                "cycle %llu: the supply stands %.0f mm in x and %.0f mm in y beside its place, turned by %.1f deg",
+                static_cast<unsigned long long>(cycle_id_), offset_mm.x(), offset_mm.y(),
+                Angle::rad(scan.place.turn_rad).in_deg());
+  }
   if (pick) {
     const auto& grasp = scan.choice.reachable[pick->reachable];
     pick_id_ = pick_id_ == 65535 ? 1 : static_cast<std::uint16_t>(pick_id_ + 1);
@@ -274,8 +291,9 @@ void Cell::publish(TimePoint now) {
     answer.pick_id = pick_id_;
     answer.objects_left = to_u16(static_cast<double>(pick->left));
     answer.score = scan.report.detections[grasp.detection].score;
-    answer.T_base_approach = supply.T_base_supply * grasp.T_supply_approach;
-    answer.T_base_grasp = supply.T_base_supply * grasp.T_supply_grasp;
+    const Transform<frame::Base, frame::Supply> T_base_supply{supply.T_base_supply.iso * scan.place.T_said_found};
+    answer.T_base_approach = T_base_supply * grasp.T_supply_approach;
+    answer.T_base_grasp = T_base_supply * grasp.T_supply_grasp;
     memory_.answered(place(), *pick, pick_id_, data_->config.picks);
     unfetched_since_ = new_scan ? std::optional{last_profile_at_} : std::nullopt;
     if (pick->again)

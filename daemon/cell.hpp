@@ -116,6 +116,7 @@ class Cell {
   std::optional<drivers::pivot::ModuleInfo> module_;
   std::optional<vision::DepthImageBuilder> builder_;
   std::vector<Eigen::Vector3f> points_supply_mm_;  // reused from profile to profile
+  std::vector<Eigen::Vector3f> points_said_mm_;    // all of a supply that has to be located
   drivers::sweep::Done sweep_done_;
   TimePoint request_at_, last_profile_at_;
   std::optional<TimePoint> unfetched_since_;  ///< Of a pick from a new scan, until the robot has it: its last profile.

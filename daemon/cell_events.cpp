@@ -201,6 +201,8 @@ void Cell::on(drivers::sweep::Event& event, TimePoint now) {
                    vision::register_profile(registered.profile.x_mm, registered.profile.z_mm, T_supply_scanner,
                                             points_supply_mm_);
                    builder_->add(points_supply_mm_);
+                   if (config.supplies[supply_].locate)
+                     points_said_mm_.insert(points_said_mm_.end(), points_supply_mm_.begin(), points_supply_mm_.end());
                  },
                  [&](const drivers::sweep::Done& done) {
                    sweep_done_ = done;

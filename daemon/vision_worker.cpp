@@ -12,7 +12,7 @@ namespace {
 /// Pictures are numbered by cycle; a picture that cannot be made never costs a cycle.
 void draw(const DetectRequest& request, const DetectResult& result) noexcept {
   const auto& dir = request.cell->config.picture_dir;
-  if (dir.empty() || !result.error.empty()) return;
+  if (dir.empty() || !result.error.empty() || !result.not_located.empty()) return;
   try {
     char name[32];
     std::snprintf(name, sizeof name, "/cycle-%06llu.png", static_cast<unsigned long long>(request.cycle_id));

@@ -71,6 +71,12 @@ constexpr std::array kAlarms{
     AlarmText{Alarm::VisionFailed, "detection failed",
               "The detection stopped with an error of its own; the log has the text.",
               "Check the knowledge base of this part (`binpick train` again), then reset; keep the log for a report."},
+    AlarmText{
+        Alarm::SupplyNotFound, "supply not found",
+        "The supply is located in every scan (supply.locate), and its rim is not seen, or stands too far off; the log "
+        "has the reason with numbers.",
+        "Put the supply to its place and clear its rim, then reset; look at supply.size_mm and at how far the sweep "
+        "reaches."},
     AlarmText{Alarm::ConfigurationRefused, "configuration refused",
               "An edited cell file has errors; the old configuration is in force.",
               "Run `binpick check` on the file, correct it, reload again."},

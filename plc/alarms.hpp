@@ -29,6 +29,7 @@ enum class Alarm : std::uint16_t {
   DetectTimeout = 501,
   RobotNotClear = 502,
   VisionFailed = 600,
+  SupplyNotFound = 601,        ///< It is to be located, and is not where it may be.
   ConfigurationRefused = 700,  ///< A reload was refused; the old configuration is in force.
   ConfigurationNeedsRestart = 701,
 };

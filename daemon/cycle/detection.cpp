@@ -13,7 +13,20 @@ double smallest_footprint_mm2(const vision::KnowledgeBase& part) {
   return edge_mm * edge_mm;
 }
 
-DetectResult look(const DetectRequest& request) {
+/// The image of a supply that stands there.
+vision::DepthImage image_of(std::span<const Eigen::Vector3f> points_said_mm, const Eigen::Isometry3d& T_said_found,
+                            const vision::SupplyBox& box, double pixel_mm) {
+  const Eigen::Isometry3f T_found_said = T_said_found.inverse().cast<float>();
+  std::vector<Eigen::Vector3f> points;
+  points.reserve(points_said_mm.size());
+  for (const auto& p : points_said_mm) points.push_back(T_found_said * p);
+  const vision::DepthWindow window = vision::window_of(box);
+  vision::DepthImageBuilder builder{pixel_mm, window.min_mm, window.max_mm};
+  builder.add(points);
+  return builder.image();
+}
+
+DetectResult look(DetectRequest& request) {
   const auto& config = request.cell->config;
   const auto& supply = config.supplies.at(request.supply);
   const auto& recipe = config.recipes.at(request.recipe);
@@ -26,6 +39,15 @@ DetectResult look(const DetectRequest& request) {
   options.search = config.detection.search;
 
   DetectResult result;
+  if (supply.locate) {
+    const auto place = vision::find_supply(request.points_said_mm, box, supply.place_limits, part.noise_mm());
+    if (!place) {
+      result.not_located = place.error();
+      return result;
+    }
+    result.place = *place;
+    request.image = image_of(request.points_said_mm, place->T_said_found, box, part.pixel_mm());
+  }
   result.loops = vision::kernels::table().name;
   result.report = vision::detect(request.image, box, part, options);
   auto& detections = result.report.detections;
@@ -51,7 +73,7 @@ DetectResult look(const DetectRequest& request) {
 }
 }  // namespace
 
-DetectResult run_detection(const DetectRequest& request) noexcept {
+DetectResult run_detection(DetectRequest& request) noexcept {
   DetectResult result;
   try {
     result = look(request);

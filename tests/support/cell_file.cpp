@@ -25,8 +25,9 @@ struct Layout {
   int pivot_height_mm, sweep_deg;
 };
 Layout layout_of(const CellFile& file) {
-  if (file.scanner == "lms400") return {"[1000, 800, 500]", 1860, 15};
-  return {"[300, 300, 120]", 560, 19};
+  // To be located the supply's rim has to be seen, wherever it stands.
+  if (file.scanner == "lms400") return {"[1000, 800, 500]", 1860, file.locate ? 26 : 15};
+  return {"[300, 300, 120]", file.locate ? 800 : 560, file.locate ? 26 : 19};
 }
 
 void write_scanner(std::ostream& out, const CellFile& file) {
@@ -37,7 +38,7 @@ void write_scanner(std::ostream& out, const CellFile& file) {
               : "\ncarrier = \"robot\"\nT_flange_scanner = { xyz_mm = [0, 80, 120], rpy_deg = [0, 0, 0] }\n");
   if (file.scanner == "lms400")
     out << "frequency_hz = " << file.frequency_hz << "\nresolution_deg = " << file.resolution_deg
-        << "\nstart_deg = 70\nrange_deg = 40\n";
+        << (file.locate ? "\nstart_deg = 55\nrange_deg = 70\n" : "\nstart_deg = 70\nrange_deg = 40\n");
   else
     out << "listen_port = 0\n";
 }
@@ -64,7 +65,8 @@ std::string to_toml(const CellFile& file) {
   out << "\n[reach]\ntilt_max_deg = " << file.tilt_max_deg << "\n\n[detection]\nthreads = 2\ndeadline_ms = 4500\n\n"
       << "[picks]\nper_scan = " << file.picks_per_scan
       << "\n\n[[supply]]\nid = 1\nname = \"lattice box\"\nsize_mm = " << layout.size_mm << "\n"
-      << "T_base_supply = { xyz_mm = [1200, 0, 0], rpy_deg = [0, 0, 0] }\n";
+      << "T_base_supply = { xyz_mm = [1200, 0, 0], rpy_deg = [0, 0, 0] }\nlocate = " << (file.locate ? "true" : "false")
+      << "\n";
   if (file.scan_path != 0)
     out << "scan_path = " << file.scan_path << "\npath_timeout_ms = 4500\n";
   else

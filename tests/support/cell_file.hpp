@@ -29,6 +29,7 @@ struct CellFile {
   double pose_latency_ms = 0;  ///< Where the robot carries the scanner.
   int detect_timeout_ms = 5000;
   int picks_per_scan = 1;
+  bool locate = false;  ///< The first supply, by its rim.
   std::string state_dir;
   std::string picture_dir;
   // Sockets, for tests that use them; in memory nobody looks at them.

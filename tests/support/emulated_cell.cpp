@@ -85,10 +85,12 @@ EmulatedCell::EmulatedCell(std::shared_ptr<const daemon::CellData> data, emulato
 }
 
 emulators::WhereScanner EmulatedCell::where_scanner(const config::Config& config) {
-  if (config.carrier == config::Carrier::Robot)
-    return emulators::on_flange(config.supplies.front().T_base_supply, config.T_flange_scanner,
-                                [this](TimePoint at) { return robot.flange_at(at); });
-  return emulators::on_pivot(scanner_place(config), [this](TimePoint at) { return pivot.angle_at(at); });
+  const auto in_said =
+      config.carrier == config::Carrier::Robot
+          ? emulators::on_flange(config.supplies.front().T_base_supply, config.T_flange_scanner,
+                                 [this](TimePoint at) { return robot.flange_at(at); })
+          : emulators::on_pivot(scanner_place(config), [this](TimePoint at) { return pivot.angle_at(at); });
+  return [this, in_said](TimePoint at) { return T_said_stands.inverse() * in_said(at); };
 }
 
 void EmulatedCell::start_daemon() {

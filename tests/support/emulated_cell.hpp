@@ -31,6 +31,8 @@ class EmulatedCell {
                const emulators::PoseClock& robot_clock = {});
 
   emulators::World world;
+  /// Where the forklift has put the supply: maps its frame as it stands to the one of the cell file.
+  Transform<frame::Supply, frame::Supply> T_said_stands;
   emulators::Pivot pivot;
   emulators::Lms400 scanner;  ///< One of the two is wired, by the cell file.
   emulators::Lps36 lps36;

@@ -278,7 +278,7 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"size_mm = [1000, 800, 500]", "size_mm = [1000, 800]", "size_mm", 11,
                 "supply.size_mm is a list of 2; give three numbers, [x, y, z]"},
         Mistake{"size_mm = [1000, 800, 500]", "size_mm = [1000, -800, 500]", "size_mm", 18,
-                "supply.size_mm[1] = -800 is outside 10 … 5000; use at least 10"}));
+                "supply.size_mm[1] = -800 is outside 0 … 5000; use at least 0"}));
 
 TEST(Load, KeysOfATransformAreCheckedOneByOne) {
   CellFolder folder;
