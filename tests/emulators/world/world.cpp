@@ -55,14 +55,22 @@ World::World(const Vector3d& supply_size_mm) : size_mm_{supply_size_mm} {
 
 int World::add(std::string_view part, std::shared_ptr<const RayMesh> mesh,
                const Transform<frame::Supply, frame::Object>& T_supply_object, double reflectance) {
-  Object object{next_id_++, std::string{part}, T_supply_object, std::move(mesh), reflectance, {}};
-  const Eigen::AlignedBox3f& own = object.mesh->box();
+  objects_.push_back({next_id_++, std::string{part}, {}, std::move(mesh), reflectance, {}});
+  move(objects_.back().id, T_supply_object);
+  return objects_.back().id;
+}
+
+bool World::move(int id, const Transform<frame::Supply, frame::Object>& T_supply_object) {
+  const auto object = std::ranges::find(objects_, id, &Object::id);
+  if (object == objects_.end()) return false;
+  object->T_supply_object = T_supply_object;
+  const Eigen::AlignedBox3f& own = object->mesh->box();
+  object->box.setEmpty();
   for (int corner = 0; corner < 8; ++corner)
-    object.box.extend(
+    object->box.extend(
         Vector3d{T_supply_object * own.corner(static_cast<Eigen::AlignedBox3f::CornerType>(corner)).cast<double>()}
             .cast<float>());
-  objects_.push_back(std::move(object));
-  return objects_.back().id;
+  return true;
 }
 
 bool World::remove(int id) {

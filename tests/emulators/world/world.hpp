@@ -32,6 +32,7 @@ class World {
   int add(std::string_view part, std::shared_ptr<const RayMesh> mesh,
           const Transform<frame::Supply, frame::Object>& T_supply_object, double reflectance = 0.9);
   bool remove(int id);  ///< False: no such object. Nothing else moves.
+  bool move(int id, const Transform<frame::Supply, frame::Object>& T_supply_object);  ///< False: no such object.
   const std::vector<Object>& objects() const { return objects_; }
   const Object* find(int id) const;
   /// Supply and floor, with id 0.

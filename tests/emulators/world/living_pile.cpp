@@ -1,0 +1,74 @@
+#include "tests/emulators/world/living_pile.hpp"
+
+#include <algorithm>
+
+#include "base/check.hpp"
+#include "tests/emulators/world/physics.hpp"
+
+namespace binpick::emulators {
+namespace {
+std::unique_ptr<Physics> placed(const ExamplePart& part, const std::vector<LivingPile::Pose>& T_supply_object,
+                                const Eigen::Vector3d& size_mm) {
+  auto physics = std::make_unique<Physics>(part, size_mm);
+  for (const auto& T : T_supply_object) physics->place(T);
+  return physics;
+}
+}  // namespace
+
+LivingPile::LivingPile(const ExamplePart& part, int count, const Eigen::Vector3d& supply_size_mm, std::uint64_t seed)
+    : LivingPile{part, supply_size_mm, throw_well(part, count, supply_size_mm, seed), static_cast<std::size_t>(count)} {
+}
+
+LivingPile::LivingPile(const ExamplePart& part, const std::vector<Pose>& T_supply_object,
+                       const Eigen::Vector3d& supply_size_mm)
+    : LivingPile{part, supply_size_mm, placed(part, T_supply_object, supply_size_mm), T_supply_object.size()} {}
+
+LivingPile::LivingPile(const ExamplePart& part, const Eigen::Vector3d& supply_size_mm, std::unique_ptr<Physics> physics,
+                       std::size_t count)
+    : part_{part}, world_{supply_size_mm}, physics_{std::move(physics)} {
+  const auto mesh = std::make_shared<RayMesh>(part_.mesh);
+  for (std::size_t k = 0; k < count; ++k) {
+    const int id = world_.add(part_.name, mesh, physics_->pose(k));
+    BINPICK_CHECK(body_of(id) == k);
+  }
+  physics_->fall_asleep();
+}
+
+LivingPile::~LivingPile() = default;
+LivingPile::LivingPile(LivingPile&&) noexcept = default;
+LivingPile& LivingPile::operator=(LivingPile&&) noexcept = default;
+
+double LivingPile::take(int id) {
+  const std::size_t taken = body_of(id);
+  for (const std::size_t other : physics_->touching(taken)) physics_->wake(other);
+  physics_->remove(taken);
+  world_.remove(id);
+  physics_->settle_again();
+  double moved_mm = 0;
+  std::vector<int> ids;
+  for (const World::Object& object : world_.objects()) ids.push_back(object.id);
+  for (const int other : ids) {
+    const Pose now = physics_->pose(body_of(other));
+    const Pose before = world_.find(other)->T_supply_object;
+    moved_mm = std::max(moved_mm, (now.iso.translation() - before.iso.translation()).norm());
+    world_.move(other, now);
+  }
+  return moved_mm;
+}
+
+std::optional<LivingPile::Push> LivingPile::first_push(int id, const std::vector<Pose>& T_supply_object,
+                                                       double limit_mm) const {
+  const std::size_t body = body_of(id);
+  std::map<std::size_t, double> at_first;
+  for (std::size_t k = 0; k < T_supply_object.size(); ++k) {
+    const auto reached = physics_->reach_mm(body, T_supply_object[k]);
+    if (k == 0) at_first = reached;
+    for (const auto& [other, depth_mm] : reached) {
+      const auto before = at_first.find(other);
+      const double more_mm = depth_mm - std::max(0.0, before == at_first.end() ? 0.0 : before->second);
+      if (more_mm > limit_mm) return Push{k, other == Physics::kSupply ? 0 : static_cast<int>(other) + 1, more_mm};
+    }
+  }
+  return std::nullopt;
+}
+}  // namespace binpick::emulators
