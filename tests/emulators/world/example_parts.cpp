@@ -9,6 +9,8 @@
 #include <stdexcept>
 
 #include "base/check.hpp"
+#include "base/rotation.hpp"
+#include "tests/emulators/world/example_grasps.hpp"
 #include "tests/emulators/world/shapes.hpp"
 
 namespace binpick::emulators {
@@ -55,14 +57,6 @@ bool in_chamfered(const Vector2f& p, const Vector2f& centre, const Vector2f& hal
   return d.x() < half.x() && d.y() < half.y() && d.sum() < half.sum() - chamfer;
 }
 
-// Directions of approach as rpy_deg: where the tcp's z points in the object frame.
-const Vector3d kDown{180, 0, 0};   // -z
-const Vector3d kUp{0, 0, 0};       // +z
-const Vector3d kAlongX{0, 90, 0};  // +x
-const Vector3d kAgainstX{0, -90, 0};
-const Vector3d kAlongY{-90, 0, 0};  // +y
-const Vector3d kAgainstY{90, 0, 0};
-
 ExamplePart gear_shaft() {
   constexpr float z0 = -90;
   const std::vector<shapes::Section> sections{{-50, 15, 0}, {-15, 20, 0}, {30, 30, 4.5F}, {45, 23, 0}, {90, 17.5F, 0}};
@@ -71,15 +65,13 @@ ExamplePart gear_shaft() {
                    .symmetry = "turning about z by 15 degrees (24 teeth); the two ends differ",
                    .mesh = shapes::turn(z0, sections, 96),
                    .pieces = {},
+                   .gripper = {},
                    .grasps = {}};
   float z = z0;
   for (const auto& section : sections) {
     part.pieces.push_back(cylinder_piece(section.radius_mm, z, section.z_end_mm, 24));
     z = section.z_end_mm;
   }
-  part.grasps = {{"across", {30, 0, 7.5}, kAgainstX, 120},
-                 {"long_end", {0, 0, 90}, kDown, 120},
-                 {"short_end", {0, 0, -90}, kUp, 120}};
   return part;
 }
 
@@ -109,16 +101,11 @@ ExamplePart track_link() {
                    .symmetry = "none",
                    .mesh = shapes::extrude(plane, levels, solid),
                    .pieces = {},
+                   .gripper = {},
                    .grasps = {}};
   // Bores and recess are filled: no corner of a neighbour reaches far into them.
   part.pieces = {chamfered_piece(high_lug, lug_half, chamfer, -25, 25),
                  chamfered_piece(low_lug, lug_half, chamfer, -13, 13), box_piece({-20, -40, -25}, {20, 40, 3})};
-  part.grasps = {{"top", {0, 0, 3}, kDown, 150},
-                 {"bottom", {0, 0, -15}, kUp, 150},
-                 {"high_end", {-100, -20, 0}, kAlongX, 150},
-                 {"low_end", {100, 20, 0}, kAgainstX, 150},
-                 {"side_left", {0, -40, -10}, kAlongY, 150},
-                 {"side_right", {0, 40, -10}, kAgainstY, 150}};
   return part;
 }
 
@@ -129,6 +116,7 @@ ExamplePart steering_wheel() {
                    .symmetry = "turning about z by 120 degrees (three spokes); the hub lies below the rim",
                    .mesh = shapes::torus(rim, tube, 72, 14),
                    .pieces = {},
+                   .gripper = {},
                    .grasps = {}};
   shapes::append(part.mesh, shapes::turn(-62, {{-34, 55, 0}, {-26, 42, 0}}, 36));
   part.pieces = {cylinder_piece(55, -62, -34, 18), cylinder_piece(42, -34, -26, 18)};
@@ -159,10 +147,6 @@ ExamplePart steering_wheel() {
     }
     part.pieces.push_back(std::move(segment));
   }
-  part.grasps = {{"hub_top", {0, 0, -26}, kDown, 150}, {"hub_bottom", {0, 0, -62}, kUp, 150}};
-  // Standing or leaning wheels are taken at the rim, at a spoke or opposite to one (the symmetry adds the others).
-  part.grasps.push_back({"rim_at_spoke", {185, 0, 0}, kAgainstX, 150});
-  part.grasps.push_back({"rim_between", {-185, 0, 0}, kAlongX, 150});
   return part;
 }
 
@@ -183,15 +167,11 @@ ExamplePart contact_bridge() {
                    .symmetry = "turning about z by 180 degrees",
                    .mesh = shapes::extrude(stretched, levels, solid),
                    .pieces = {},
+                   .gripper = {},
                    .grasps = {}};
   part.pieces = {box_piece({-30, -9, 2}, {-8, 9, 6}), box_piece({8, -9, 2}, {30, 9, 6}),
                  box_piece({-8, -5.4F, 2}, {8, 5.4F, 6}), box_piece({-30, -9, -6}, {-18, 9, 2}),
                  box_piece({18, -9, -6}, {30, 9, 2})};
-  part.grasps = {{"top", {0, 0, 6}, kDown, 60},
-                 {"bottom", {0, 0, 2}, kUp, 60},
-                 {"end", {30, 0, 2}, kAgainstX, 60},
-                 {"side_left", {0, -5.4, 4}, kAlongY, 60},
-                 {"side_right", {0, 5.4, 4}, kAgainstY, 60}};
   return part;
 }
 
@@ -202,17 +182,37 @@ void write_file(const std::filesystem::path& path, std::string_view content) {
 }
 }  // namespace
 
+vision::Grasp ExampleGrasp::grasp() const {
+  vision::Grasp grasp;
+  grasp.name = name;
+  grasp.T_object_tcp.iso.linear() = from_wpr_deg(rpy_deg);
+  grasp.T_object_tcp.iso.translation() = xyz_mm;
+  grasp.approach_mm = approach_mm;
+  grasp.opening_mm = opening_mm;
+  grasp.holding_mm = holding_mm;
+  grasp.preference = preference;
+  return grasp;
+}
+
 const std::vector<std::string>& example_part_names() {
   static const std::vector<std::string> names{"gear_shaft", "track_link", "steering_wheel", "contact_bridge"};
   return names;
 }
 
-ExamplePart example_part(std::string_view name) {
+namespace {
+ExamplePart body_named(std::string_view name) {
   if (name == "gear_shaft") return gear_shaft();
   if (name == "track_link") return track_link();
   if (name == "steering_wheel") return steering_wheel();
   BINPICK_CHECK(name == "contact_bridge");
   return contact_bridge();
+}
+}  // namespace
+
+ExamplePart example_part(std::string_view name) {
+  ExamplePart part = body_named(name);
+  add_gripper(part);
+  return part;
 }
 
 std::string write_example_part(std::string_view name, const std::string& folder) {
@@ -231,9 +231,17 @@ std::string write_example_part(std::string_view name, const std::string& folder)
     text << '[' << v.x() << ", " << v.y() << ", " << v.z() << ']';
     return text.str();
   };
+  const vision::Gripper::Jaws& jaws = *part.gripper.jaws;
+  toml << "\n[gripper]\nopening_max_mm = " << jaws.opening_max_mm << "\njaw_size_mm = " << list(jaws.size_mm)
+       << "\nbeyond_mm = " << jaws.beyond_mm << '\n';
+  for (const vision::Gripper::Solid& solid : part.gripper.body)
+    toml << "\n[[gripper_body]]\nshape = \"" << (solid.shape == vision::Gripper::Solid::Shape::Box ? "box" : "cylinder")
+         << "\"\nsize_mm = " << list(solid.size_mm)
+         << "\nT_tcp_solid = { xyz_mm = " << list(solid.T_tcp_solid.translation()) << ", rpy_deg = [0, 0, 0] }\n";
   for (const ExampleGrasp& grasp : part.grasps)
     toml << "\n[[grasp]]\nname = \"" << grasp.name << "\"\nT_object_tcp = { xyz_mm = " << list(grasp.xyz_mm)
-         << ", rpy_deg = " << list(grasp.rpy_deg) << " }\napproach_mm = " << grasp.approach_mm << '\n';
+         << ", rpy_deg = " << list(grasp.rpy_deg) << " }\napproach_mm = " << grasp.approach_mm
+         << "\nopening_mm = " << grasp.opening_mm << "\nholding_mm = " << grasp.holding_mm << '\n';
   const std::string path = base.string() + ".toml";
   write_file(path, toml.str());
   return path;

@@ -5,6 +5,8 @@
 #include <string_view>
 #include <vector>
 
+#include "vision/grasp.hpp"
+#include "vision/gripper.hpp"
 #include "vision/mesh.hpp"
 
 /// The four parts that demo, tests and benches share, made here so that no mesh file has to be carried around.
@@ -18,12 +20,16 @@ ConvexPiece box_piece(const Eigen::Vector3f& low, const Eigen::Vector3f& high);
 /// Prism over a regular polygon, axis z.
 ConvexPiece cylinder_piece(float radius, float z_low, float z_high, int corners);
 
-/// As a PART.toml says it: the tcp's z axis points into the part, the way of approach.
+/// As a PART.toml says it: the tcp's z axis points into the part, the way of approach; the jaws move along its x axis.
 struct ExampleGrasp {
   std::string name;
-  Eigen::Vector3d xyz_mm;
-  Eigen::Vector3d rpy_deg;  ///< [W, P, R]: R = Rz(R)·Ry(P)·Rx(W).
+  Eigen::Vector3d xyz_mm = Eigen::Vector3d::Zero();
+  Eigen::Vector3d rpy_deg = Eigen::Vector3d::Zero();  ///< [W, P, R]: R = Rz(R)·Ry(P)·Rx(W).
   double approach_mm = 100;
+  double opening_mm = 0, holding_mm = 0;
+  double preference = 0;
+
+  vision::Grasp grasp() const;
 };
 
 struct ExamplePart {
@@ -32,7 +38,8 @@ struct ExamplePart {
   std::string symmetry;  ///< In words, for the file's comment.
   vision::Mesh mesh;     ///< Closed.
   std::vector<ConvexPiece> pieces;
-  std::vector<ExampleGrasp> grasps;
+  vision::Gripper gripper;
+  std::vector<ExampleGrasp> grasps;  ///< See example_grasps.hpp.
 };
 
 /// "gear_shaft", "track_link", "steering_wheel", "contact_bridge".

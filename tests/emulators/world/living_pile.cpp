@@ -1,6 +1,7 @@
 #include "tests/emulators/world/living_pile.hpp"
 
 #include <algorithm>
+#include <limits>
 
 #include "base/check.hpp"
 #include "tests/emulators/world/physics.hpp"
@@ -56,6 +57,14 @@ double LivingPile::take(int id) {
   return moved_mm;
 }
 
+double LivingPile::lowest_mm(const Pose& T_supply_object) const {
+  const Eigen::RowVector3d up = T_supply_object.iso.linear().row(2);
+  double lowest = std::numeric_limits<double>::infinity();
+  for (const ConvexPiece& piece : part_.pieces)
+    for (const Eigen::Vector3f& p : piece.points_mm) lowest = std::min(lowest, up.dot(p.cast<double>()));
+  return lowest + T_supply_object.iso.translation().z();
+}
+
 std::optional<LivingPile::Push> LivingPile::first_push(int id, const std::vector<Pose>& T_supply_object,
                                                        double limit_mm) const {
   const std::size_t body = body_of(id);
@@ -64,6 +73,8 @@ std::optional<LivingPile::Push> LivingPile::first_push(int id, const std::vector
     const auto reached = physics_->reach_mm(body, T_supply_object[k]);
     if (k == 0) at_first = reached;
     for (const auto& [other, depth_mm] : reached) {
+      // The physics' walls never end; over the real ones nothing is in the way.
+      if (other == Physics::kSupply && lowest_mm(T_supply_object[k]) > world_.supply_size_mm().z()) continue;
       const auto before = at_first.find(other);
       const double more_mm = depth_mm - std::max(0.0, before == at_first.end() ? 0.0 : before->second);
       if (more_mm > limit_mm) return Push{k, other == Physics::kSupply ? 0 : static_cast<int>(other) + 1, more_mm};

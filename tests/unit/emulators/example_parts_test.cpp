@@ -8,7 +8,12 @@
 #include <gtest/gtest.h>
 #include <map>
 #include <numbers>
+#include <set>
 #include <sstream>
+
+#include "config/config.hpp"
+#include "tests/emulators/world/grip.hpp"
+#include "tests/emulators/world/solid_contact.hpp"
 
 namespace binpick::emulators {
 namespace {
@@ -90,23 +95,24 @@ TEST_P(Parts, PiecesCoverTheMesh) {
   EXPECT_LT((all.sizes() - mesh_box.sizes()).cwiseAbs().maxCoeff(), 6);
 }
 
-TEST_P(Parts, GraspsStandOnTheSurfaceAndPointInwards) {
+TEST_P(Parts, GraspsComeFreelyAndHoldAsWideAsTheySay) {
   const ExamplePart part = example_part(GetParam().name);
-  ASSERT_GE(part.grasps.size(), 2U);
-  for (const auto& grasp : part.grasps) {
-    constexpr double deg = std::numbers::pi / 180;
-    const Eigen::Matrix3d R = (Eigen::AngleAxisd{grasp.rpy_deg.z() * deg, Eigen::Vector3d::UnitZ()} *
-                               Eigen::AngleAxisd{grasp.rpy_deg.y() * deg, Eigen::Vector3d::UnitY()} *
-                               Eigen::AngleAxisd{grasp.rpy_deg.x() * deg, Eigen::Vector3d::UnitX()})
-                                  .toRotationMatrix();
-    // From the grasp point backwards nothing of the part is met: the tool comes through free space.
-    const Eigen::Vector3d back = -R.col(2);
-    for (const auto& v : part.mesh.vertices_mm) {
-      const Eigen::Vector3d d = v.cast<double>() - grasp.xyz_mm;
-      if ((d - d.dot(back) * back).norm() < 3) {
-        EXPECT_LT(d.dot(back), 1.0) << grasp.name;
-      }
-    }
+  const RayMesh mesh{part.mesh};
+  ASSERT_GE(part.grasps.size(), 10U);
+  std::set<std::string> names;
+  for (const ExampleGrasp& each : part.grasps) {
+    const vision::Grasp grasp = each.grasp();
+    EXPECT_TRUE(names.insert(grasp.name).second) << grasp.name;
+    ASSERT_LE(*grasp.opening_mm, part.gripper.jaws->opening_max_mm) << grasp.name;
+    for (double back = 0; back <= grasp.approach_mm; back += 1)
+      for (const auto& solid : vision::solids_of(part.gripper, *grasp.opening_mm))
+        ASSERT_FALSE(
+            meets(solid, grasp.T_object_tcp.iso * Eigen::Translation3d(0, 0, -back) * solid.T_tcp_solid, 0, mesh))
+            << grasp.name << ", " << back << " mm from the grasp";
+    const auto closed = closed_on(mesh, part.gripper, grasp, GripRules::of(part));
+    ASSERT_TRUE(closed) << grasp.name;
+    EXPECT_NEAR(closed->jaws_mm, *grasp.holding_mm, 1) << grasp.name;
+    EXPECT_NEAR(closed->off_middle_mm, 0, 1) << grasp.name;
   }
 }
 
@@ -118,9 +124,23 @@ TEST(ExampleParts, AreWrittenAsStlAndToml) {
   std::stringstream text;
   text << in.rdbuf();
   EXPECT_NE(text.str().find("mesh = \"track_link.stl\"\nscanner = \"lms400\"\n"), std::string::npos);
-  EXPECT_NE(text.str().find("[[grasp]]\nname = \"top\"\nT_object_tcp = { xyz_mm = [0, 0, 3], rpy_deg = [180, 0, 0] }\n"
-                            "approach_mm = 150\n"),
-            std::string::npos);
+  EXPECT_NE(
+      text.str().find("[[grasp]]\nname = \"bridge_top\"\nT_object_tcp = { xyz_mm = [0, 0, -14], rpy_deg = [180, 0, "
+                      "90] }\napproach_mm = 150\nopening_mm = 95\nholding_mm = 80\n"),
+      std::string::npos);
+  const auto read = config::load_part(path);
+  ASSERT_TRUE(read) << to_string(read.error().front());
+  const ExamplePart part = example_part("track_link");
+  ASSERT_TRUE(read->gripper);
+  EXPECT_EQ(read->gripper->body.size(), part.gripper.body.size());
+  EXPECT_EQ(read->gripper->jaws->size_mm, part.gripper.jaws->size_mm);
+  ASSERT_EQ(read->grasps.size(), part.grasps.size());
+  for (std::size_t i = 0; i < part.grasps.size(); ++i) {
+    const vision::Grasp told = part.grasps[i].grasp();
+    EXPECT_LT((read->grasps[i].T_object_tcp.iso.matrix() - told.T_object_tcp.iso.matrix()).norm(), 1e-3) << told.name;
+    EXPECT_EQ(read->grasps[i].opening_mm, told.opening_mm);
+    EXPECT_EQ(read->grasps[i].holding_mm, told.holding_mm);
+  }
   const auto triangles = example_part("track_link").mesh.triangles.size();
   EXPECT_EQ(std::filesystem::file_size(folder + "/track_link.stl"), 84 + 50 * triangles);
 }

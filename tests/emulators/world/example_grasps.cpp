@@ -1,0 +1,165 @@
+#include "tests/emulators/world/example_grasps.hpp"
+
+#include <cmath>
+#include <numbers>
+
+#include "base/check.hpp"
+#include "base/rotation.hpp"
+
+namespace binpick::emulators {
+namespace {
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Solid = vision::Gripper::Solid;
+
+constexpr double kDegree = std::numbers::pi / 180;
+const Vector3d kX = Vector3d::UnitX(), kY = Vector3d::UnitY(), kZ = Vector3d::UnitZ();
+
+/// Palm and what carries it: a box as wide as the open jaws, a tool changer, the arm's last axis. Behind the jaws.
+vision::Gripper gripper(double opening_max_mm, const Vector3d& jaw_mm, double palm_y_mm, double scale) {
+  vision::Gripper gripper;
+  gripper.jaws = vision::Gripper::Jaws{opening_max_mm, jaw_mm, 0};
+  double back = -jaw_mm.z();
+  const auto add = [&](Solid::Shape shape, const Vector3d& size_mm) {
+    Solid solid{shape, size_mm, Eigen::Isometry3d::Identity()};
+    solid.T_tcp_solid.translation().z() = back - size_mm.z() / 2;
+    gripper.body.push_back(solid);
+    back -= size_mm.z();
+  };
+  add(Solid::Shape::Box, {opening_max_mm + 2 * jaw_mm.x(), palm_y_mm, 50 * scale});
+  add(Solid::Shape::Cylinder, {63 * scale, 63 * scale, 60 * scale});
+  add(Solid::Shape::Cylinder, {100 * scale, 100 * scale, 250 * scale});
+  return gripper;
+}
+
+/// The jaws' tips at `tips`; they come along `way` and move along `jaws`, which is made perpendicular to it.
+ExampleGrasp grasp(const std::string& name, const Vector3d& tips, const Vector3d& way, const Vector3d& jaws,
+                   double opening_mm, double holding_mm, double approach_mm) {
+  Matrix3d R;
+  R.col(2) = way.normalized();
+  R.col(0) = (jaws - jaws.dot(R.col(2)) * R.col(2)).normalized();
+  R.col(1) = R.col(2).cross(R.col(0));
+  const auto rounded = [](Vector3d v, double step) {
+    for (Eigen::Index i = 0; i < 3; ++i) v[i] = std::round(v[i] / step) * step + 0.0;
+    return v;
+  };
+  return {name, rounded(tips, 1e-3), rounded(to_wpr_deg(R), 1e-4), approach_mm, opening_mm, holding_mm, 0};
+}
+
+std::string degrees(double angle) { return std::to_string(std::lround(angle)); }
+
+/// Taken across its round sections, with the tips behind the axis; from the side, obliquely from the ends, and from the
+/// ends.
+void gear_shaft(ExamplePart& part) {
+  constexpr double kBehind = 7, kGap = 7;
+  part.gripper = gripper(54, {6, 16, 110}, 40, 1);
+  struct Place {
+    const char* name;
+    double z, radius;
+    std::vector<double> leans;  ///< The next section is thicker: not over it.
+  };
+  for (const Place& place : {Place{"short_end", -78, 15, {0, 25, -25}}, Place{"short_inner", -62, 15, {0, 25}},
+                             Place{"middle", -32, 20, {0, 25}}, Place{"long_inner", 58, 17.5, {0, -25}},
+                             Place{"long_end", 78, 17.5, {0, 25, -25}}})
+    for (const double lean : place.leans) {
+      const Vector3d way = -std::cos(lean * kDegree) * kX + std::sin(lean * kDegree) * kZ;
+      part.grasps.push_back(grasp(place.name + (lean == 0 ? "" : "_" + degrees(lean)), place.z * kZ + kBehind * way,
+                                  way, kY, 2 * place.radius + 2 * kGap, 2 * place.radius, 120));
+    }
+  for (const double end : {-1.0, 1.0}) {
+    const double radius = end < 0 ? 15 : 17.5;
+    const std::string name = end < 0 ? "short" : "long";
+    part.grasps.push_back(grasp(name + "_axial", end * 62 * kZ, -end * kZ, kY, 2 * radius + 2 * kGap, 2 * radius, 120));
+    for (const double lean : {50.0, 70.0}) {
+      const Vector3d way = -std::cos(lean * kDegree) * kX - end * std::sin(lean * kDegree) * kZ;
+      part.grasps.push_back(grasp(name + "_oblique_" + degrees(lean), end * 72 * kZ + 8 * way, way, kY,
+                                  2 * radius + 2 * kGap, 2 * radius, 120));
+    }
+  }
+}
+
+/// Taken in its bores from within, over the thickness of its lugs from their edges, and across the bridge.
+void track_link(ExamplePart& part) {
+  constexpr double kGap = 8;
+  part.gripper = gripper(96, {7, 14, 110}, 40, 1);
+  struct Lug {
+    const char* name;
+    Vector3d middle;
+    double half_mm, bore_holding_mm, outwards;
+  };
+  // A flat jaw of 14 mm in a bore touches it beside its middle line.
+  for (const Lug& lug : {Lug{"high", {-60, -20, 0}, 25, 27.6, -1}, Lug{"low", {60, 20, 0}, 13, 17.0, 1}}) {
+    const double thick = 2 * lug.half_mm;
+    for (const double side : {1.0, -1.0}) {
+      const Vector3d tips = lug.middle + side * (lug.half_mm - 20) * kZ;
+      for (const double turn : {0.0, 45.0, 90.0, 135.0})
+        part.grasps.push_back(grasp(std::string{lug.name} + (side > 0 ? "_bore_top_" : "_bore_bottom_") + degrees(turn),
+                                    tips, -side * kZ, std::cos(turn * kDegree) * kX + std::sin(turn * kDegree) * kY, 3,
+                                    lug.bore_holding_mm, 150));
+    }
+    // Over the edge, between two cut corners or across one of them; not where the bridge is.
+    for (const double turn : {-90.0, -45.0, 0.0, 45.0, 90.0}) {
+      const Vector3d out = lug.outwards * (std::cos(turn * kDegree) * kX + std::sin(turn * kDegree) * kY);
+      const double edge = std::abs(turn) == 45 ? (40 + 40 - 20) / std::numbers::sqrt2 : 40;
+      part.grasps.push_back(grasp(std::string{lug.name} + "_edge_" + degrees(turn), lug.middle + (edge - 17) * out,
+                                  -out, kZ, thick + 2 * kGap, thick, 150));
+    }
+  }
+  part.grasps.push_back(grasp("bridge_top", -14 * kZ, -kZ, kY, 95, 80, 150));
+  part.grasps.push_back(grasp("bridge_bottom", -3 * kZ, kZ, kY, 95, 80, 150));
+}
+
+/// Taken at the rim, between the spokes: from above, from below and from without.
+void steering_wheel(ExamplePart& part) {
+  constexpr double kRim = 170, kTube = 15, kBehind = 8, kGap = 10;
+  part.gripper = gripper(52, {8, 18, 110}, 40, 1);
+  for (const double at : {22.0, 60.0, 98.0}) {
+    const Vector3d out = std::cos(at * kDegree) * kX + std::sin(at * kDegree) * kY;
+    for (const double lean : {0.0, 30.0, 60.0, 90.0, 120.0, 150.0, 180.0}) {
+      const Vector3d way = -std::sin(lean * kDegree) * out - std::cos(lean * kDegree) * kZ;
+      part.grasps.push_back(grasp("rim_" + degrees(at) + "_" + degrees(lean), kRim * out + kBehind * way, way,
+                                  way.cross(out.cross(kZ)), 2 * kTube + 2 * kGap, 2 * kTube, 150));
+    }
+  }
+}
+
+/// Taken at its waist, at the contact blocks from above, below, the sides and the ends.
+void contact_bridge(ExamplePart& part) {
+  constexpr double kGap = 2.5;
+  part.gripper = gripper(24, {2.5, 6, 30}, 18, 0.4);
+  const auto add = [&](const std::string& name, const Vector3d& tips, const Vector3d& way, const Vector3d& jaws,
+                       double width) {
+    part.grasps.push_back(grasp(name, tips, way, jaws, width + 2 * kGap, width, 60));
+  };
+  // The waist is a plate from z = 2 to 6; the floor may be right behind it.
+  add("waist_top", 0.5 * kZ, -kZ, kY, 10.8);
+  add("waist_bottom", 5.2 * kZ, kZ, kY, 10.8);
+  for (const double end : {-1.0, 1.0}) {
+    const Vector3d block = 24 * end * kX;
+    const std::string name = end < 0 ? "left" : "right";
+    add(name + "_top", block - 2 * kZ, -kZ, kY, 18);
+    add(name + "_bottom", block + 2 * kZ, kZ, kY, 18);
+    for (const double side : {-1.0, 1.0}) {
+      add(name + (side < 0 ? "_below" : "_above"), block + side * 1.5 * kY, -side * kY, kZ, 12);
+      add(name + (side < 0 ? "_below_in" : "_above_in"), block + side * 1.5 * kY - 2 * kZ, -side * kY, kX, 12);
+    }
+    add(name + "_end_flat", 22 * end * kX, -end * kX, kZ, 12);
+    add(name + "_end_wide", 22 * end * kX, -end * kX, kY, 18);
+    for (const double lean : {-45.0, 45.0}) {
+      const Vector3d way = -std::cos(lean * kDegree) * end * kX - std::sin(lean * kDegree) * kZ;
+      add(name + "_end_" + degrees(lean), block + 1.5 * way, way, kY, 18);
+      const Vector3d across = -std::cos(lean * kDegree) * end * kX - std::sin(lean * kDegree) * kY;
+      add(name + "_corner_" + degrees(lean), block + 2 * across, across, kZ, 12);
+    }
+  }
+}
+}  // namespace
+
+void add_gripper(ExamplePart& part) {
+  if (part.name == "gear_shaft") return gear_shaft(part);
+  if (part.name == "track_link") return track_link(part);
+  if (part.name == "steering_wheel") return steering_wheel(part);
+  BINPICK_CHECK(part.name == "contact_bridge");
+  contact_bridge(part);
+}
+}  // namespace binpick::emulators
