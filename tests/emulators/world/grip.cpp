@@ -242,6 +242,12 @@ std::optional<Closed> closed_on(const RayMesh& part, const Gripper& gripper, con
   return close_jaws(gripper, grasp, {{1, &part, grasp.T_object_tcp.iso}}, 1, rules).closed;
 }
 
+bool stands_free(const World& world, const Gripper& gripper, const Grasp& grasp, const TcpPose& T_supply_grasp,
+                 const GripRules& rules) {
+  const double opening = grasp.opening_mm.value_or(gripper.jaws ? gripper.jaws->opening_max_mm : 0);
+  return !first_hit(world, vision::solids_of(gripper, opening), gripper.body.size(), {T_supply_grasp}, 0, rules.hit_mm);
+}
+
 GripResult grip(const LivingPile& pile, const Gripper& gripper, const std::vector<Grasp>& grasps,
                 const vision::Symmetry& symmetry, const GripMotion& motion, const GripRules& rules) {
   const World& world = pile.world();

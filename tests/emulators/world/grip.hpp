@@ -64,6 +64,10 @@ struct GripMotion {
 GripResult grip(const LivingPile& pile, const vision::Gripper& gripper, const std::vector<vision::Grasp>& grasps,
                 const vision::Symmetry& symmetry, const GripMotion& motion, const GripRules& rules);
 
+/// Whether the open gripper hits nothing at the grasp pose itself: quickly asked before grip().
+bool stands_free(const World& world, const vision::Gripper& gripper, const vision::Grasp& grasp,
+                 const Transform<frame::Supply, frame::Tcp>& T_supply_grasp, const GripRules& rules);
+
 /// Where the jaws stand when they hold the part as the grasp says, by its mesh; nothing: they do not touch it.
 struct Closed {
   double jaws_mm = 0;                ///< Between the inner faces.
