@@ -241,6 +241,16 @@ const std::vector<Section<Config>>& cell_sections() {
                      "scan plane."},
             [](C& c) -> Slot { return &c.T_flange_scanner.iso; }},
        }},
+      {"record",
+       "A file of each cycle, to look into it again: `binpick replay` (docs/records.md).",
+       {
+           {{.name = "dir", .type = Path, .default_value = "\"\"",
+             .help = "Folder for them, made when it is not there; empty: nothing is recorded."},
+            [](C& c) -> Slot { return &c.record.dir; }},
+           {{.name = "size_max_mb", .type = Number, .unit = "MB", .min = 1, .max = 1e6, .default_value = "500",
+             .help = "All records together; the oldest are removed. A cycle needs one to five."},
+            [](C& c) -> Slot { return &c.record.size_max_mb; }},
+       }},
       {"robot",
        "The socket that the robot's program fetches picks from (docs/robots/).",
        {

@@ -77,6 +77,12 @@ struct Picks {
 enum class ScannerModel { Lms400, Lps36, Lps36Hi };
 enum class Carrier { Pivot, Robot };
 
+/// A file of each cycle (docs/records.md).
+struct Records {
+  std::string dir;           ///< Empty: none.
+  double size_max_mb = 500;  ///< Of all of them, in 10^6 bytes; the oldest go.
+};
+
 struct Config {
   std::string path;
   std::string text;  ///< Its content, as it was read.
@@ -112,6 +118,7 @@ struct Config {
   Detection detection;
   Picks picks;
   std::string picture_dir;  ///< A PNG per cycle goes here; empty: none.
+  Records record;
   std::string state_dir;  ///< boot_count lives here.
 
   /// Where the PLC is, as `plc.role` says: where it connects to, or where it is asked.

@@ -261,6 +261,7 @@ Expected<Config, std::vector<Diagnostic>> load_document(const std::string& path,
 
   config.text = std::move(document.text);
   config.state_dir = resolved(path, config.state_dir);
+  config.record.dir = resolved(path, config.record.dir);
   config.picture_dir = resolved(path, config.picture_dir);
   for (const auto& recipe : config.recipes) config.plc.part_ids.push_back(recipe.id);
   for (const auto& supply : config.supplies) config.plc.supply_ids.push_back(supply.id);

@@ -50,6 +50,7 @@ Cell::Cell(std::shared_ptr<const CellData> data, std::uint16_t boot_count)
                          ? std::make_optional<drivers::sweep::RobotCarrier>(robot_, *poses_, numbers_before(boot_count))
                          : std::nullopt},
       sweep_{carrier(), scanner_},
+      boot_count_{boot_count},
       pick_id_{numbers_before(boot_count)} {
   robot_.withdraw(drivers::robot::NoPick::NotReady);
 }
@@ -127,12 +128,14 @@ void Cell::on_detect_result(DetectResult result, TimePoint now) {
   }
   if (!result.error.empty()) {
     cycle_alarm_ = plc::Alarm::VisionFailed;
+    if (record_) record_->result = result;
     BINPICK_LOG(Error, "vision", "detection failed: %s; the scan is given up, ask again", result.error.c_str());
     apply(CellInput::DetectionFailed, now);
     return;
   }
   if (!result.not_located.empty()) {
     cycle_alarm_ = plc::Alarm::SupplyNotFound;
+    if (record_) record_->result = result;
     BINPICK_LOG(Warning, "cell", "cycle %llu: %s", static_cast<unsigned long long>(cycle_id_),
                 result.not_located.c_str());
     return apply(CellInput::DetectionFailed, now);
@@ -213,19 +216,19 @@ void Cell::apply(CellInput input, TimePoint now) {
     case CellEffect::FaultCycle:
       stop_cycle(now);
       plc_.fault(cycle_alarm_, now);
+      end_record({.alarm = cycle_alarm_}, now);
       break;
     case CellEffect::StopQuietly:
       stop_cycle(now);
+      end_record({}, now);
       break;
   }
 }
 
 void Cell::begin_sweep(TimePoint now) {
   const auto& supply = data_->config.supplies[supply_];
-  const auto& part = data_->knowledge_bases[recipe_];
-  const Eigen::Vector2d half = supply.size_mm.head<2>() / 2;
-  builder_.emplace(part.pixel_mm(), -half, half);
-  points_said_mm_.clear();
+  picture_.emplace(data_, supply_, recipe_);
+  if (record_) record_->scan.emplace();
   pivot_carrier_.set_latency(data_->config.pivot_latency);
   if (robot_carrier_) robot_carrier_->set_latency(data_->config.pose_latency);
   sweep_.begin({.motion = motion_over(supply), .scanner_latency = data_->config.scanner_latency}, now);
@@ -244,19 +247,10 @@ drivers::sweep::Motion Cell::motion_over(const config::Supply& supply) const {
 void Cell::start_detection(TimePoint now) {
   last_profile_at_ = now;
   plc_.on_scan_done(now);
-  DetectRequest request;
-  request.cycle_id = cycle_id_;
-  if (data_->config.supplies[supply_].locate)
-    request.points_said_mm = std::move(points_said_mm_);
-  else
-    request.image = builder_->image();
-  request.cell = data_;
-  request.supply = supply_;
-  request.recipe = recipe_;
   BINPICK_LOG(Info, "cell", "cycle %llu: sweep of %.2f s, %zu profiles, %zu points; robot may enter",
               static_cast<unsigned long long>(cycle_id_), in_s(sweep_done_.duration), sweep_done_.profiles,
-              builder_->points());
-  detect_request_ = std::move(request);
+              picture_->points());
+  detect_request_ = picture_->take_request(cycle_id_);
 }
 
 void Cell::publish(TimePoint now) {
@@ -272,7 +266,7 @@ void Cell::publish(TimePoint now) {
   if (new_scan) {
     answer.figures.sweep_ms = to_u16(in_ms(sweep_done_.duration));
     answer.figures.profiles = to_u16(static_cast<double>(sweep_done_.profiles));
-    answer.figures.points = static_cast<std::uint32_t>(builder_->points());
+    answer.figures.points = static_cast<std::uint32_t>(picture_->points());
     answer.figures.hypotheses = static_cast<std::uint32_t>(scan.report.hypotheses);
     answer.figures.detection_ms = to_u16(scan.report.time_ms);
   }
@@ -311,6 +305,12 @@ void Cell::publish(TimePoint now) {
     tell_why_none(scan);
   }
   plc_.publish(answer, now);
+  if (record_ && new_scan) record_->result = scan;
+  if (record_ && !new_scan) record_->scan_of_cycle = scan.cycle_id;
+  end_record({.code = answer.code,
+              .pick_id = answer.pick_id,
+              .reachable = pick ? std::optional{static_cast<std::uint32_t>(pick->reachable)} : std::nullopt},
+             now);
   if (!new_scan) {
     BINPICK_LOG(Info, "cell", "cycle %llu: pick %u from the scan before, score %.2f",
                 static_cast<unsigned long long>(cycle_id_), answer.pick_id, answer.score);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <optional>
 #include <string>
@@ -9,6 +10,8 @@
 #include "base/clock.hpp"
 #include "daemon/cycle/cell_data.hpp"
 #include "daemon/cycle/detection.hpp"
+#include "daemon/cycle/record.hpp"
+#include "daemon/cycle/scan_picture.hpp"
 #include "daemon/pick_memory.hpp"
 #include "daemon/sequence.hpp"
 #include "drivers/pivot/session.hpp"
@@ -18,7 +21,6 @@
 #include "drivers/sweep/robot_carrier.hpp"
 #include "drivers/sweep/sweep.hpp"
 #include "plc/session.hpp"
-#include "vision/depth_image.hpp"
 
 namespace binpick::daemon {
 /// The cell: the four sessions, wired together. No I/O, no clock: the daemon pumps it on sockets, tests in memory and
@@ -42,6 +44,10 @@ class Cell {
   /// The scan to look through, once per cycle, when its last profile is in.
   std::optional<DetectRequest> take_detect_request();
   void on_detect_result(DetectResult result, TimePoint now);
+  /// What a cycle that has ended leaves, oldest first; only where the configuration wants records.
+  std::optional<Record> take_record();
+  /// Records can be written, or cannot: an alarm, and never more than that.
+  void on_records_written(bool written, TimePoint now);
 
   /// New configuration; in force at once when no cycle runs, else after it. What only a restart can change keeps its
   /// old value and is named in the log and by an alarm.
@@ -71,6 +77,8 @@ class Cell {
   void tell_why_none(const DetectResult& scan) const;
   PickMemory::Place place() const { return {request_.supply_id, request_.part_id}; }
   void stop_cycle(TimePoint now);
+  void begin_record();
+  void end_record(RecordedAnswer answer, TimePoint now);
   void put_in_force(TimePoint now);
   void update_ready(TimePoint now);
   void watch_robot_lines(TimePoint now);
@@ -108,19 +116,20 @@ class Cell {
   std::optional<TimePoint> robot_bad_since_;
   std::optional<Trouble> pivot_trouble_, scanner_trouble_, poses_trouble_;
   std::uint64_t cycle_id_ = 0;
+  std::uint16_t boot_count_ = 0;
   std::uint16_t pick_id_ = 0;
   plc::Alarm cycle_alarm_ = plc::Alarm::None;  // why FaultCycle
   plc::PickRequest request_;
   PickMemory memory_;
   std::size_t supply_ = 0, recipe_ = 0;  // indices of the running request
   std::optional<drivers::pivot::ModuleInfo> module_;
-  std::optional<vision::DepthImageBuilder> builder_;
-  std::vector<Eigen::Vector3f> points_supply_mm_;  // reused from profile to profile
-  std::vector<Eigen::Vector3f> points_said_mm_;    // all of a supply that has to be located
+  std::optional<ScanPicture> picture_;
   drivers::sweep::Done sweep_done_;
   TimePoint request_at_, last_profile_at_;
   std::optional<TimePoint> unfetched_since_;  ///< Of a pick from a new scan, until the robot has it: its last profile.
   std::optional<DetectRequest> detect_request_;
   std::optional<DetectResult> detect_result_;
+  std::optional<Record> record_;  // of the running cycle, where it is wanted
+  std::deque<Record> records_;    // of those that have ended
 };
 }  // namespace binpick::daemon

@@ -4,7 +4,6 @@
 #include "base/log.hpp"
 #include "base/overloaded.hpp"
 #include "daemon/cell.hpp"
-#include "vision/registration.hpp"
 
 /// What the sessions say, as inputs of the cycle's table.
 namespace binpick::daemon {
@@ -46,17 +45,6 @@ plc::Alarm alarm_of(const drivers::scanner::Failed& failed) {
   }
   return plc::Alarm::ScannerNoReply;
 }
-
-Transform<frame::Base, frame::Scanner> scanner_at(const config::Config& config,
-                                                  const drivers::sweep::CarrierPose& carrier) {
-  return std::visit(Overloaded{
-                        [&](const Angle& pivot) { return vision::scanner_at(config.mount, pivot); },
-                        [&](const Transform<frame::Base, frame::Flange>& T_base_flange) {
-                          return T_base_flange * config.T_flange_scanner;
-                        },
-                    },
-                    carrier);
-}
 }  // namespace
 
 void Cell::on(const plc::Event& event, TimePoint now) {
@@ -72,6 +60,7 @@ void Cell::on(const plc::Event& event, TimePoint now) {
                    supply_ = static_cast<std::size_t>(supply - config.supplies.begin());
                    ++cycle_id_;
                    request_at_ = now;
+                   begin_record();
                    robot_.withdraw(drivers::robot::NoPick::NotReady);
                    BINPICK_LOG(Info, "cell", "cycle %llu: request %u for part %u in supply %u",
                                static_cast<unsigned long long>(cycle_id_), request_.sequence, request_.part_id,
@@ -116,6 +105,7 @@ void Cell::on(const plc::Event& event, TimePoint now) {
                    stop_cycle(now);
                    state_ = CellState::Idle;
                    plc_.fault(plc::Alarm::PlcLost, now);
+                   end_record({.alarm = plc::Alarm::PlcLost}, now);
                  },
                  [&](const plc::PlcBack&) { BINPICK_LOG(Notice, "plc", "the PLC is there"); },
              },
@@ -192,20 +182,14 @@ void Cell::on(const drivers::robot::Event& event, TimePoint now) {
 
 void Cell::on(drivers::sweep::Event& event, TimePoint now) {
   std::visit(Overloaded{
-                 [&](const drivers::sweep::RegisteredProfile& registered) {
+                 [&](drivers::sweep::RegisteredProfile& registered) {
                    if (state_ != CellState::Sweeping) return;
-                   const auto& config = data_->config;
-                   const auto T_base_scanner = scanner_at(config, registered.carrier);
-                   const auto T_supply_scanner = config.supplies[supply_].T_base_supply.inverse() * T_base_scanner;
-                   points_supply_mm_.clear();
-                   vision::register_profile(registered.profile.x_mm, registered.profile.z_mm, T_supply_scanner,
-                                            points_supply_mm_);
-                   builder_->add(points_supply_mm_);
-                   if (config.supplies[supply_].locate)
-                     points_said_mm_.insert(points_said_mm_.end(), points_supply_mm_.begin(), points_supply_mm_.end());
+                   picture_->add(registered);
+                   if (record_) record_->scan->profiles.push_back(std::move(registered));
                  },
                  [&](const drivers::sweep::Done& done) {
                    sweep_done_ = done;
+                   if (record_) record_->scan->figures = done;
                    if (done.profiles_lost > 0) {
                      BINPICK_LOG(Warning, "scanner",
                                  "%llu profiles lost in the sweep; check the network to the scanner",

@@ -15,6 +15,7 @@
 #include "daemon/cell.hpp"
 #include "daemon/links.hpp"
 #include "daemon/progress_watch.hpp"
+#include "daemon/record_writer.hpp"
 #include "daemon/reloader.hpp"
 #include "daemon/vision_worker.hpp"
 #include "drivers/link/loop.hpp"
@@ -82,6 +83,7 @@ int run(const std::string& path) {
   drivers::link::Loop loop;
   Links links{loop, cell};
   VisionWorker worker{[&loop] { loop.wake(); }};
+  RecordWriter records{[&loop] { loop.wake(); }};
   Reloader reloader{[&path] { return load_cell(path); }, [&loop] { loop.wake(); }};
   Watchdog watchdog;
   std::optional<TimePoint> stop_by;
@@ -130,14 +132,20 @@ int run(const std::string& path) {
         cell.run(now);
       }
     }
+    while (auto record = cell.take_record()) {
+      const auto since_1970 = std::chrono::system_clock::now().time_since_epoch();
+      record->origin.unix_ms = std::chrono::duration_cast<std::chrono::milliseconds>(since_1970).count();
+      records.post(std::move(*record), cell.data().config.record);
+    }
+    if (const auto written = records.take_change()) cell.on_records_written(*written, now);
     links.flush(now);
     watchdog.turn(worker, cell.data().config.detection.deadline, now);
-    if (stop_by && (cell.safe() || now >= *stop_by)) break;
+    if (stop_by && ((cell.safe() && records.idle()) || now >= *stop_by)) break;
     now = loop.wait(earlier(earlier(cell.deadline(), links.deadline()), earlier(watchdog.deadline(), stop_by)));
   }
   links.flush(clock.now());
   BINPICK_LOG(Notice, "daemon", "stopped%s", cell.safe() ? "" : ", but the pivot did not answer");
-  if (worker.busy() || reloader.pending()) {
+  if (worker.busy() || reloader.pending() || !records.idle()) {
     // Neither a detection nor a slow file system can be broken off; nobody waits for them any more.
     std::fflush(nullptr);
     _exit(0);

@@ -83,6 +83,11 @@ constexpr std::array kAlarms{
     AlarmText{Alarm::ConfigurationNeedsRestart, "configuration needs a restart",
               "A reload changed keys that take effect only at a start; the log names them.",
               "Restart binpickd between two picks, or take the edit back."},
+    AlarmText{
+        Alarm::RecordsNotWritten, "records are not written",
+        "The records of cycles cannot be written: the disk is full, too slow, or the folder refuses them. Picking "
+        "goes on.",
+        "Make room on the disk or lower record.size_max_mb; the log says what failed."},
 };
 static_assert(std::ranges::is_sorted(kAlarms, {}, &AlarmText::alarm));
 }  // namespace

@@ -32,6 +32,7 @@ enum class Alarm : std::uint16_t {
   SupplyNotFound = 601,        ///< It is to be located, and is not where it may be.
   ConfigurationRefused = 700,  ///< A reload was refused; the old configuration is in force.
   ConfigurationNeedsRestart = 701,
+  RecordsNotWritten = 710,  ///< Cycles go on without.
 };
 
 /// One line of the alarm list as it stands on a panel: what, why, what to do.

@@ -50,8 +50,9 @@ struct RecordedAnswer {
   plc::ResultCode code = plc::ResultCode::None;  ///< None: no answer, the cycle ended without.
   plc::Alarm alarm = plc::Alarm::None;           ///< Of a cycle that ended by a fault.
   std::uint16_t pick_id = 0;
-  std::vector<std::uint16_t> registers;  ///< The whole map, as the PLC then read it.
-  TimePoint requested_at, last_profile_at, answered_at;
+  std::optional<std::uint32_t> reachable{};  ///< The grasp that was answered: of the result's choice.
+  std::vector<std::uint16_t> registers{};    ///< The whole map, as the PLC then read it.
+  TimePoint requested_at{}, last_profile_at{}, answered_at{};
 };
 
 struct Record {
@@ -64,6 +65,6 @@ struct Record {
   std::optional<RecordedAnswer> answer;
 };
 
-/// The texts and knowledge bases that `cell` was made of.
-RecordedCell recorded(const CellData& cell);
+/// The beginning of a record: which cycle, by which binpick, and the texts and knowledge bases that the cell ran on.
+Record begun_record(const CellData& cell, std::uint16_t boot_count, std::uint64_t cycle_id);
 }  // namespace binpick::daemon

@@ -63,6 +63,7 @@ void put(FieldWriter& out, const RecordedRequest& request) {
   out.number(request.request.supply_id);
   out.number(request.supply);
   out.number(request.recipe);
+  out.number(request.request.new_scan);
 }
 void take(FieldReader& in, RecordedRequest& request) {
   in.number(request.request.sequence);
@@ -70,6 +71,7 @@ void take(FieldReader& in, RecordedRequest& request) {
   in.number(request.request.supply_id);
   in.number(request.supply);
   in.number(request.recipe);
+  in.number(request.request.new_scan);
 }
 
 enum class CarrierKind : std::uint8_t { Pivot, Robot };
@@ -245,6 +247,10 @@ void put(FieldWriter& out, const DetectResult& result) {
   out.number(result.fill.measured);
   put(out, result.report);
   put(out, result.choice);
+  out.text(result.not_located);
+  out.isometry(result.place.T_said_found);
+  out.number(result.place.turn_rad);
+  out.number(static_cast<std::int32_t>(result.place.walls));
 }
 void take(FieldReader& in, DetectResult& result) {
   in.number(result.cycle_id);
@@ -256,6 +262,10 @@ void take(FieldReader& in, DetectResult& result) {
   in.number(result.fill.measured);
   take(in, result.report);
   take(in, result.choice);
+  in.text(result.not_located);
+  in.isometry(result.place.T_said_found);
+  in.number(result.place.turn_rad);
+  result.place.walls = in.number<std::int32_t>();
 }
 
 void put(FieldWriter& out, const RecordedAnswer& answer) {
@@ -267,6 +277,7 @@ void put(FieldWriter& out, const RecordedAnswer& answer) {
   out.time(answer.requested_at);
   out.time(answer.last_profile_at);
   out.time(answer.answered_at);
+  out.number(answer.reachable ? static_cast<std::int32_t>(*answer.reachable) : -1);
 }
 void take(FieldReader& in, RecordedAnswer& answer) {
   in.number(answer.code);
@@ -277,6 +288,9 @@ void take(FieldReader& in, RecordedAnswer& answer) {
   in.time(answer.requested_at);
   in.time(answer.last_profile_at);
   in.time(answer.answered_at);
+  std::int32_t reachable = -1;
+  in.number(reachable);
+  if (reachable >= 0) answer.reachable = static_cast<std::uint32_t>(reachable);
 }
 
 void put(FieldWriter& out, const std::uint64_t& cycle) { out.number(cycle); }

@@ -52,6 +52,10 @@ inline DetectResult result_of_all_fields() {
   result.choice.reachable = {
       {0, 1, transform_of<frame::Supply, frame::Tcp>(1.1), transform_of<frame::Supply, frame::Tcp>(1.2)}};
   result.choice.unreachable = {{1, "tilt 51 deg is over 40 deg"}};
+  result.place.T_said_found.translation() = Eigen::Vector3d{3, 4, 0};
+  result.place.turn_rad = 0.02;
+  result.place.walls = 3;
+  result.not_located = "no wall was seen";
   return result;
 }
 
@@ -61,7 +65,7 @@ inline Record record_of_all_fields() {
   record.cell.cell = {"/etc/binpick/cell.toml", "[cell]\nname = \"test\"\n"};
   record.cell.parts = {{"/etc/binpick/a.toml", "mesh = \"a.stl\"\n"}, {"/etc/binpick/b.toml", "mesh = \"b.stl\"\n"}};
   record.cell.knowledge_bases = {{"/var/lib/binpick/a.kb", 0x0123456789ABCDEF}, {"/var/lib/binpick/b.kb", 2}};
-  record.request = RecordedRequest{{9, 1, 2}, 1, 0};
+  record.request = RecordedRequest{{9, 1, 2, true}, 1, 0};
   auto& scan = record.scan.emplace();
   scan.profiles = {profile_of(5, Angle::rad(0.25)), profile_of(6, transform_of<frame::Base, frame::Flange>(0.3))};
   scan.figures = {std::chrono::milliseconds(1500), 2, 1, 3};
@@ -70,6 +74,7 @@ inline Record record_of_all_fields() {
   record.answer = RecordedAnswer{plc::ResultCode::PickFound,
                                  plc::Alarm::ScanTimeout,
                                  12,
+                                 0,
                                  {1, 2, 65535},
                                  TimePoint{std::chrono::nanoseconds(123'456'789)},
                                  TimePoint{std::chrono::nanoseconds(223'456'789)},
