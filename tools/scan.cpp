@@ -7,12 +7,14 @@
 #include "base/clock.hpp"
 #include "base/overloaded.hpp"
 #include "config/config.hpp"
+#include "daemon/cycle/record_codec.hpp"
 #include "drivers/sweep/pivot_carrier.hpp"
 #include "drivers/sweep/sweep.hpp"
 #include "tools/commands.hpp"
 #include "tools/device_links.hpp"
 #include "tools/output.hpp"
 #include "vision/cloud.hpp"
+#include "vision/file.hpp"
 #include "vision/registration.hpp"
 
 /// binpick scan CELL.toml -o SCENE.ply: one sweep, saved as a cloud that `detect` reads.
@@ -22,6 +24,21 @@ constexpr Duration kReadyMax = std::chrono::seconds(45);  // a reference run and
 constexpr Duration kSweepMax = std::chrono::seconds(60);
 
 using Cloud = std::vector<Eigen::Vector3f>;
+
+struct ScanOrder {
+  std::string cell, cloud, record;  ///< Paths; the record's may be empty.
+  int supply = 0;                   ///< Id; 0: the first one.
+};
+
+/// The raw profiles, for whoever wants to register them otherwise: `binpick calibrate`.
+Expected<void, std::string> save_record(const std::string& path, const config::Config& config,
+                                        daemon::RecordedScan scan) {
+  const auto since_1970 = std::chrono::system_clock::now().time_since_epoch();
+  daemon::Record record = daemon::begun_record({config, {}}, 0, 0);
+  record.origin.unix_ms = std::chrono::duration_cast<std::chrono::milliseconds>(since_1970).count();
+  record.scan = std::move(scan);
+  return vision::write_file(path, daemon::encode(record));
+}
 
 bool ready(DeviceLinks& devices) {
   return devices.pivot().state() == drivers::pivot::Session::State::Standing &&
@@ -48,7 +65,8 @@ bool bring_up(DeviceLinks& devices, drivers::sweep::PivotCarrier& carrier, Troub
   return true;
 }
 
-int scan(const std::string& cell_path, const std::string& out_path, int supply_id) {
+int scan(const ScanOrder& order) {
+  const std::string& cell_path = order.cell;
   const auto config = config::load(cell_path);
   if (!config) {
     std::fprintf(stderr, "binpick: %s is not a good cell file; see all findings with: binpick check %s\n",
@@ -62,19 +80,20 @@ int scan(const std::string& cell_path, const std::string& out_path, int supply_i
   }
   const config::Supply* supply = nullptr;
   for (const auto& candidate : config->supplies)
-    if (supply_id == 0 || candidate.id == supply_id) {
+    if (order.supply == 0 || candidate.id == order.supply) {
       supply = &candidate;
       break;
     }
   if (supply == nullptr) {
     std::fprintf(stderr, "binpick: %s has no supply %d; name one of its [[supply]] ids\n", cell_path.c_str(),
-                 supply_id);
+                 order.supply);
     return 2;
   }
-  if (const auto trouble = cannot_be_written(out_path); !trouble.empty()) {
-    std::fprintf(stderr, "binpick: %s\n", trouble.c_str());
-    return 1;
-  }
+  for (const auto& path : {order.cloud, order.record})
+    if (const auto trouble = path.empty() ? path : cannot_be_written(path); !trouble.empty()) {
+      std::fprintf(stderr, "binpick: %s\n", trouble.c_str());
+      return 1;
+    }
   if (daemon_runs(*config)) {
     std::fprintf(stderr, "binpick: binpickd is at work on %s and holds the devices; stop it before scanning\n",
                  config->plc_line().c_str());
@@ -102,6 +121,7 @@ int scan(const std::string& cell_path, const std::string& out_path, int supply_i
               now);
 
   Cloud cloud;
+  daemon::RecordedScan raw;
   std::optional<drivers::sweep::Done> done;
   std::optional<std::string> failure;
   const TimePoint until = now + kSweepMax;
@@ -110,6 +130,7 @@ int scan(const std::string& cell_path, const std::string& out_path, int supply_i
         const auto T_base_scanner = vision::scanner_at(config->mount, std::get<Angle>(registered.carrier));
         vision::register_profile(registered.profile.x_mm, registered.profile.z_mm,
                                  supply->T_base_supply.inverse() * T_base_scanner, cloud);
+        raw.profiles.push_back(registered);
       },
       [&](const drivers::sweep::Done& sweep_done) { done = sweep_done; },
       [&](const drivers::sweep::Failed& failed) { failure = failed.text; },
@@ -128,28 +149,30 @@ int scan(const std::string& cell_path, const std::string& out_path, int supply_i
     std::fprintf(stderr, "binpick: the sweep failed: %s\n", failure->c_str());
     return 1;
   }
-  if (const auto saved = vision::save_cloud(out_path, cloud); !saved) {
+  raw.figures = *done;
+  if (!order.record.empty())
+    if (const auto saved = save_record(order.record, *config, std::move(raw)); !saved) {
+      std::fprintf(stderr, "binpick: %s\n", saved.error().c_str());
+      return 1;
+    }
+  if (const auto saved = vision::save_cloud(order.cloud, cloud); !saved) {
     std::fprintf(stderr, "binpick: %s\n", saved.error().text.c_str());
     return 1;
   }
   std::printf("%s: %zu points of %zu profiles over supply %u in %.2f s (%llu lost, %zu without a pose)\n",
-              out_path.c_str(), cloud.size(), done->profiles, supply->id, in_s(done->duration),
+              order.cloud.c_str(), cloud.size(), done->profiles, supply->id, in_s(done->duration),
               static_cast<unsigned long long>(done->profiles_lost), done->profiles_without_pose);
   return 0;
 }
 }  // namespace
 
 void add_scan(CLI::App& app, int& exit_status) {
-  struct Arguments {
-    std::string cell, out;
-    int supply = 0;
-  };
-  auto arguments = std::make_shared<Arguments>();
+  auto order = std::make_shared<ScanOrder>();
   auto* command = app.add_subcommand("scan", "One sweep, saved as a cloud that detect reads. The pivot moves!");
-  command->add_option("CELL.toml", arguments->cell, "the cell file")->required();
-  command->add_option("-o,--output", arguments->out, "the cloud to write (SCENE.ply)")->required();
-  command->add_option("--supply", arguments->supply, "id of the supply; default: the first one");
-  command->callback(
-      [arguments, &exit_status] { exit_status = scan(arguments->cell, arguments->out, arguments->supply); });
+  command->add_option("CELL.toml", order->cell, "the cell file")->required();
+  command->add_option("-o,--output", order->cloud, "the cloud to write (SCENE.ply)")->required();
+  command->add_option("--supply", order->supply, "id of the supply; default: the first one");
+  command->add_option("--record", order->record, "write the raw profiles too (SCAN.bpr)");
+  command->callback([order, &exit_status] { exit_status = scan(*order); });
 }
 }  // namespace binpick::tools
