@@ -345,8 +345,8 @@ const std::vector<Section<Config>>& cell_sections() {
              .help = "An older scan is not used again."},
             [](C& c) -> Slot { return &c.picks.scan_valid; }},
            {{.name = "margin_mm", .type = Number, .unit = "mm", .min = 0, .max = 1000, .default_value = "10",
-             .help = "Seen from above, the next object stands so far apart from all that were picked from the scan: it "
-                     "has not moved with them."},
+             .help = "Seen from above, the next object stands so far apart from all that were picked from the scan, and "
+                     "from what touched these: it has not moved with them."},
             [](C& c) -> Slot { return &c.picks.margin_mm; }},
            {{.name = "failed_scans", .type = Integer, .min = 0, .max = 1000, .default_value = "10",
              .help = "For so many scans a failed pick is remembered: its object comes after all others, and is left alone "

@@ -34,15 +34,19 @@ std::optional<PickMemory::Pick> PickMemory::next(const Place& place, const confi
   if (!fresh &&
       (scan.picked.size() >= static_cast<std::size_t>(options.per_scan) || now - scan.at > options.scan_valid))
     return std::nullopt;
+  const auto& footprints = scan.result.footprints;
+  const auto touches = [&](std::size_t a, std::size_t b) {
+    return a == b || vision::gap_mm(footprints[a], footprints[b]) < options.margin_mm;
+  };
+  // What touched a picked object may have moved, and pushes what touches it.
+  std::vector<std::size_t> moved = scan.picked;
+  for (std::size_t d = 0; d < footprints.size(); ++d)
+    if (std::ranges::any_of(scan.picked, [&](std::size_t picked) { return touches(picked, d); })) moved.push_back(d);
   const std::size_t left = scan.result.report.detections.size() - scan.picked.size() - 1;
   std::optional<Pick> again;
   for (std::size_t i = 0; i < scan.result.choice.reachable.size(); ++i) {
     const std::size_t detection = scan.result.choice.reachable[i].detection;
-    const auto& footprints = scan.result.footprints;
-    const bool stands_apart = std::ranges::all_of(scan.picked, [&](std::size_t picked) {
-      return picked != detection && vision::gap_mm(footprints[picked], footprints[detection]) >= options.margin_mm;
-    });
-    if (!stands_apart) continue;
+    if (std::ranges::any_of(moved, [&](std::size_t d) { return touches(d, detection); })) continue;
     const int failures = failures_of(place, scan.result.centres_mm[detection]);
     if (failures == 0) return Pick{i, false, left};
     if (fresh && failures < kPicksMax && !again) again = Pick{i, true, left};

@@ -52,6 +52,13 @@ TEST_F(PickMemoryTest, OneScanGivesWhatStandsApart) {
   EXPECT_EQ(pick(), std::nullopt);
 }
 
+TEST_F(PickMemoryTest, WhatTouchesANeighbourOfAPickedOneMayHaveMoved) {
+  scan({0, 44, 22, 100});  // 0, 22 and 44 stand in a row
+  EXPECT_EQ(pick(), 0);
+  EXPECT_EQ(pick(), 3);
+  EXPECT_EQ(pick(), std::nullopt);
+}
+
 TEST_F(PickMemoryTest, NoMoreThanItIsAllowed) {
   options.per_scan = 1;
   scan({0, 100});
