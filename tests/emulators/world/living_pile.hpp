@@ -47,6 +47,7 @@ class LivingPile {
  private:
   LivingPile(const ExamplePart& part, const Eigen::Vector3d& supply_size_mm, std::unique_ptr<Physics> physics,
              std::size_t count);
+  bool stirred(std::size_t body) const;  ///< Since the last take().
   double lowest_mm(const Pose& T_supply_object) const;
   std::size_t body_of(int id) const { return static_cast<std::size_t>(id) - 1; }
 

@@ -174,7 +174,20 @@ double Physics::speed_mm_s(std::size_t body) const {
   return static_cast<double>(bodies_[body]->getLinearVelocity().length()) * unit_mm_;
 }
 
-void Physics::settle_again() {
+/// Bullet sorts bodies by whether they can move when they are added.
+void Physics::set_free(std::size_t body, bool free) {
+  btRigidBody& b = *bodies_[body];
+  if (b.isStaticObject() != free) return;
+  dynamics_.removeRigidBody(&b);
+  b.setMassProps(free ? 1 : 0, free ? inertia_ : btVector3{0, 0, 0});
+  b.updateInertiaTensor();
+  dynamics_.addRigidBody(&b);
+}
+
+void Physics::settle_again(const std::set<std::size_t>& free) {
+  for (std::size_t k = 0; k < bodies_.size(); ++k)
+    if (bodies_[k]) set_free(k, free.contains(k));
+  for (const std::size_t k : free) bodies_[k]->activate(true);
   // What rolls or rattles for seconds is braked more and more; it still falls.
   double seconds = 0;
   for (const Brake& brake : kBrakes) {
@@ -196,8 +209,6 @@ void Physics::fall_asleep() {
     body->setActivationState(ISLAND_SLEEPING);
   }
 }
-
-void Physics::wake(std::size_t body) { bodies_[body]->activate(true); }
 
 std::size_t Physics::index_of(const btCollisionObject* body) const {
   const int index = body->getUserIndex();

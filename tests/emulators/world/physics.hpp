@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <random>
+#include <set>
 #include <vector>
 
 #include "tests/emulators/world/pile.hpp"
@@ -27,8 +28,8 @@ class Physics {
   /// Drops so many one after the other from above, each turned at random, and waits until they lie still.
   void throw_in(int count, std::uint64_t seed);
   void place(const Pose& T_supply_object);  ///< At rest.
-  /// After something was removed; all fall asleep then.
-  void settle_again();
+  /// After something was removed: these move, all others stand like walls. All fall asleep then.
+  void settle_again(const std::set<std::size_t>& free);
   Pile result();
 
   void remove(std::size_t body);  ///< Its index stays empty.
@@ -37,7 +38,6 @@ class Physics {
   double speed_mm_s(std::size_t body) const;
   /// Bodies that lie still are no longer reckoned with until something that touches them moves.
   void fall_asleep();
-  void wake(std::size_t body);
   std::vector<std::size_t> touching(std::size_t body);  ///< Within the margin; without the supply.
   /// How deep this body would reach into others if it were there; only of those that it would touch.
   std::map<std::size_t, double> reach_mm(std::size_t body, const Pose& T_supply_object);
@@ -52,6 +52,7 @@ class Physics {
   void add_supply();
   void add_shape(const ExamplePart& part);
   void add_body(const btTransform& T_supply_centre);
+  void set_free(std::size_t body, bool free);
   btTransform centre_of(const Pose& T_supply_object) const;
   std::size_t index_of(const btCollisionObject* body) const;
 
