@@ -1,7 +1,9 @@
 #include "bench/production/bin_run.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <ctime>
 #include <limits>
 #include <numbers>
@@ -185,10 +187,22 @@ KnownCell known_cell(const daemon::CellData& data, const emulators::GripRules& r
   return {*part.gripper, part.grasps, data.knowledge_bases.front().symmetry(), data.config.reach.tilt_max_rad, rules};
 }
 
-int left_by_known_poses(const ProductionPart& part, const daemon::CellData& data, std::uint64_t bin,
-                        std::uint64_t seed) {
+int left_by_known_poses(const ProductionPart& part, const daemon::CellData& data, std::uint64_t bin, std::uint64_t seed,
+                        std::vector<std::string>* reasons) {
+  std::array<char, 120> text{};
   LivingPile pile{emulators::example_part(part.name), part.objects, part.supply_mm, pile_seed(bin, seed)};
-  return empty_by_known_poses(pile, known_cell(data, emulators::GripRules::of(pile.part())));
+  const KnownCell cell = known_cell(data, emulators::GripRules::of(pile.part()));
+  const int left = empty_by_known_poses(pile, cell);
+  for (const auto& object : pile.world().objects()) {
+    const Eigen::Vector3d& t = object.T_supply_object.iso.translation();
+    std::snprintf(text.data(), text.size(),
+                  "bin %llu, object %d at (%.0f, %.0f, %.0f):", static_cast<unsigned long long>(bin), object.id, t.x(),
+                  t.y(), t.z());
+    if (reasons != nullptr) reasons->push_back(text.data());
+    for (const std::string& reason : why_not(pile, object.id, cell))
+      if (reasons != nullptr) reasons->push_back("  " + reason);
+  }
+  return left;
 }
 
 BinOutcome run_bin(const ProductionPart& part, const std::shared_ptr<const daemon::CellData>& data, std::uint64_t bin,

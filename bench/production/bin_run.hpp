@@ -24,7 +24,7 @@ BinOutcome run_bin(const ProductionPart& part, const std::shared_ptr<const daemo
                    std::uint64_t seed);
 
 KnownCell known_cell(const daemon::CellData& data, const emulators::GripRules& rules);
-/// The same bin, but the poses are known and only the gripper decides: objects that are left over.
-int left_by_known_poses(const ProductionPart& part, const daemon::CellData& data, std::uint64_t bin,
-                        std::uint64_t seed);
+/// The same bin, but the poses are known and only the gripper decides: objects that are left over, and why.
+int left_by_known_poses(const ProductionPart& part, const daemon::CellData& data, std::uint64_t bin, std::uint64_t seed,
+                        std::vector<std::string>* reasons);
 }  // namespace binpick::bench

@@ -43,6 +43,20 @@ std::optional<GripMotion> free_grasp(const LivingPile& pile, int object, const K
   return std::nullopt;
 }
 
+std::vector<std::string> why_not(const LivingPile& pile, int object, const KnownCell& cell) {
+  std::vector<std::string> reasons;
+  const Eigen::Isometry3d T_supply_object = pile.world().find(object)->T_supply_object.iso;
+  for (const Eigen::Isometry3d& T_object_same : same_poses(cell.symmetry))
+    for (const vision::Grasp& grasp : cell.grasps) {
+      const Eigen::Isometry3d T = T_supply_object * T_object_same * grasp.T_object_tcp.iso;
+      if (-T.linear()(2, 2) < std::cos(cell.tilt_max_rad)) continue;
+      const GripMotion motion{{T * Eigen::Translation3d{0, 0, -grasp.approach_mm}}, {T}};
+      reasons.push_back(grasp.name + ": " +
+                        to_string(grip(pile, cell.gripper, cell.grasps, cell.symmetry, motion, cell.rules)));
+    }
+  return reasons;
+}
+
 int with_free_grasp(const LivingPile& pile, const KnownCell& cell) {
   int count = 0;
   for (const auto& object : pile.world().objects()) count += free_grasp(pile, object.id, cell).has_value();

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "tests/emulators/world/grip.hpp"
@@ -22,4 +23,6 @@ std::optional<emulators::GripMotion> free_grasp(const emulators::LivingPile& pil
 int with_free_grasp(const emulators::LivingPile& pile, const KnownCell& cell);
 /// Takes one object after the other, the highest first; returns how many are left that nobody can take.
 int empty_by_known_poses(emulators::LivingPile& pile, const KnownCell& cell);
+/// For each grasp of the object that is steep enough, what comes of it.
+std::vector<std::string> why_not(const emulators::LivingPile& pile, int object, const KnownCell& cell);
 }  // namespace binpick::bench

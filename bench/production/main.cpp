@@ -69,8 +69,11 @@ void by_known_poses(const Arguments& arguments) {
     if (!arguments.part.empty() && arguments.part != part.name) continue;
     const auto data = load_production_cell(part, arguments.out, arguments.threads);
     int left = 0;
+    std::vector<std::string> reasons;
     for (int bin = 1; bin <= arguments.known_poses; ++bin)
-      left += left_by_known_poses(part, *data, static_cast<std::uint64_t>(bin), arguments.seed);
+      left += left_by_known_poses(part, *data, static_cast<std::uint64_t>(bin), arguments.seed, &reasons);
+    for (const std::string& reason : reasons)
+      if (arguments.talks) std::printf("%s\n", reason.c_str());
     std::printf("%s: %d of %d objects in %d bins cannot be taken, whoever knows their poses (%.1f %%)\n",
                 part.name.c_str(), left, arguments.known_poses * part.objects, arguments.known_poses,
                 100.0 * left / (arguments.known_poses * part.objects));

@@ -15,7 +15,8 @@ using Solid = vision::Gripper::Solid;
 constexpr double kDegree = std::numbers::pi / 180;
 const Vector3d kX = Vector3d::UnitX(), kY = Vector3d::UnitY(), kZ = Vector3d::UnitZ();
 
-/// Palm and what carries it: a box as wide as the open jaws, a tool changer, the arm's last axis. Behind the jaws.
+/// Behind the jaws: the palm, a box as wide as they open; a stem that is longer than walls are high; the arm's last
+/// axis.
 vision::Gripper gripper(double opening_max_mm, const Vector3d& jaw_mm, double palm_y_mm, double scale) {
   vision::Gripper gripper;
   gripper.jaws = vision::Gripper::Jaws{opening_max_mm, jaw_mm, 0};
@@ -27,8 +28,8 @@ vision::Gripper gripper(double opening_max_mm, const Vector3d& jaw_mm, double pa
     back -= size_mm.z();
   };
   add(Solid::Shape::Box, {opening_max_mm + 2 * jaw_mm.x(), palm_y_mm, 50 * scale});
-  add(Solid::Shape::Cylinder, {63 * scale, 63 * scale, 60 * scale});
-  add(Solid::Shape::Cylinder, {100 * scale, 100 * scale, 250 * scale});
+  add(Solid::Shape::Cylinder, {63 * scale, 63 * scale, 200 * scale});
+  add(Solid::Shape::Cylinder, {100 * scale, 100 * scale, 200 * scale});
   return gripper;
 }
 
@@ -51,7 +52,7 @@ std::string degrees(double angle) { return std::to_string(std::lround(angle)); }
 /// Taken across its round sections, with the tips behind the axis; from the side, obliquely from the ends, and from the
 /// ends.
 void gear_shaft(ExamplePart& part) {
-  constexpr double kBehind = 7, kGap = 7;
+  constexpr double kBehind = 7, kGap = 7, kBack = 50;
   part.gripper = gripper(54, {6, 16, 110}, 40, 1);
   struct Place {
     const char* name;
@@ -64,61 +65,72 @@ void gear_shaft(ExamplePart& part) {
     for (const double lean : place.leans) {
       const Vector3d way = -std::cos(lean * kDegree) * kX + std::sin(lean * kDegree) * kZ;
       part.grasps.push_back(grasp(place.name + (lean == 0 ? "" : "_" + degrees(lean)), place.z * kZ + kBehind * way,
-                                  way, kY, 2 * place.radius + 2 * kGap, 2 * place.radius, 120));
+                                  way, kY, 2 * place.radius + 2 * kGap, 2 * place.radius, kBack));
     }
   for (const double end : {-1.0, 1.0}) {
     const double radius = end < 0 ? 15 : 17.5;
     const std::string name = end < 0 ? "short" : "long";
-    part.grasps.push_back(grasp(name + "_axial", end * 62 * kZ, -end * kZ, kY, 2 * radius + 2 * kGap, 2 * radius, 120));
+    part.grasps.push_back(
+        grasp(name + "_axial", end * 62 * kZ, -end * kZ, kY, 2 * radius + 2 * kGap, 2 * radius, kBack));
     for (const double lean : {50.0, 70.0}) {
       const Vector3d way = -std::cos(lean * kDegree) * kX - end * std::sin(lean * kDegree) * kZ;
       part.grasps.push_back(grasp(name + "_oblique_" + degrees(lean), end * 72 * kZ + 8 * way, way, kY,
-                                  2 * radius + 2 * kGap, 2 * radius, 120));
+                                  2 * radius + 2 * kGap, 2 * radius, kBack));
     }
   }
 }
 
 /// Taken in its bores from within, over the thickness of its lugs from their edges, and across the bridge.
 void track_link(ExamplePart& part) {
-  constexpr double kGap = 8;
-  part.gripper = gripper(96, {7, 14, 110}, 40, 1);
+  constexpr double kGap = 8, kBack = 50, kBackFromBore = 28;
+  const Vector3d kJaw{7, 14, 110};
+  part.gripper = gripper(96, kJaw, 40, 1);
   struct Lug {
     const char* name;
     Vector3d middle;
-    double half_mm, bore_holding_mm, outwards;
+    double half_mm, bore_mm, outwards;
+    std::vector<double> leans;  ///< As far as the jaws have room in the bore.
   };
-  // A flat jaw of 14 mm in a bore touches it beside its middle line.
-  for (const Lug& lug : {Lug{"high", {-60, -20, 0}, 25, 27.6, -1}, Lug{"low", {60, 20, 0}, 13, 17.0, 1}}) {
+  for (const Lug& lug : {Lug{"high", {-60, -20, 0}, 25, 22, -1, {0, 15, -15, 30, -30}},
+                         Lug{"low", {60, 20, 0}, 13, 17, 1, {0, 15, -15}}}) {
     const double thick = 2 * lug.half_mm;
-    for (const double side : {1.0, -1.0}) {
-      const Vector3d tips = lug.middle + side * (lug.half_mm - 20) * kZ;
-      for (const double turn : {0.0, 45.0, 90.0, 135.0})
-        part.grasps.push_back(grasp(std::string{lug.name} + (side > 0 ? "_bore_top_" : "_bore_bottom_") + degrees(turn),
-                                    tips, -side * kZ, std::cos(turn * kDegree) * kX + std::sin(turn * kDegree) * kY, 3,
-                                    lug.bore_holding_mm, 150));
-    }
+    // In the bore, 20 mm deep; also a little slanted, so that the tool stands upright where the link does not quite
+    // lie.
+    for (const double side : {1.0, -1.0})
+      for (const double turn : {0.0, 60.0, 120.0})
+        for (const double lean : lug.leans) {
+          const Vector3d jaws = std::cos(turn * kDegree) * kX + std::sin(turn * kDegree) * kY;
+          const Vector3d way = -side * std::cos(lean * kDegree) * kZ + std::sin(lean * kDegree) * kZ.cross(jaws);
+          // A flat jaw touches the round wall beside its middle line.
+          const double beside = kJaw.y() / 2 + 10 * std::tan(std::abs(lean) * kDegree);
+          const double holding = 2 * (std::sqrt(lug.bore_mm * lug.bore_mm - beside * beside) - kJaw.x());
+          part.grasps.push_back(grasp(std::string{lug.name} + (side > 0 ? "_bore_top_" : "_bore_bottom_") +
+                                          degrees(turn) + (lean == 0 ? "" : "_" + degrees(lean)),
+                                      lug.middle + side * (lug.half_mm - 10) * kZ + 10 * way, way, jaws, 3,
+                                      std::round(holding * 10) / 10, kBackFromBore));
+        }
     // Over the edge, between two cut corners or across one of them; not where the bridge is.
     for (const double turn : {-90.0, -45.0, 0.0, 45.0, 90.0}) {
       const Vector3d out = lug.outwards * (std::cos(turn * kDegree) * kX + std::sin(turn * kDegree) * kY);
       const double edge = std::abs(turn) == 45 ? (40 + 40 - 20) / std::numbers::sqrt2 : 40;
       part.grasps.push_back(grasp(std::string{lug.name} + "_edge_" + degrees(turn), lug.middle + (edge - 17) * out,
-                                  -out, kZ, thick + 2 * kGap, thick, 150));
+                                  -out, kZ, thick + 2 * kGap, thick, kBack));
     }
   }
-  part.grasps.push_back(grasp("bridge_top", -14 * kZ, -kZ, kY, 95, 80, 150));
-  part.grasps.push_back(grasp("bridge_bottom", -3 * kZ, kZ, kY, 95, 80, 150));
+  part.grasps.push_back(grasp("bridge_top", -14 * kZ, -kZ, kY, 95, 80, kBack));
+  part.grasps.push_back(grasp("bridge_bottom", -3 * kZ, kZ, kY, 95, 80, kBack));
 }
 
 /// Taken at the rim, between the spokes: from above, from below and from without.
 void steering_wheel(ExamplePart& part) {
-  constexpr double kRim = 170, kTube = 15, kBehind = 8, kGap = 10;
+  constexpr double kRim = 170, kTube = 15, kBehind = 8, kGap = 10, kBack = 50;
   part.gripper = gripper(52, {8, 18, 110}, 40, 1);
   for (const double at : {22.0, 60.0, 98.0}) {
     const Vector3d out = std::cos(at * kDegree) * kX + std::sin(at * kDegree) * kY;
     for (const double lean : {0.0, 30.0, 60.0, 90.0, 120.0, 150.0, 180.0}) {
       const Vector3d way = -std::sin(lean * kDegree) * out - std::cos(lean * kDegree) * kZ;
       part.grasps.push_back(grasp("rim_" + degrees(at) + "_" + degrees(lean), kRim * out + kBehind * way, way,
-                                  way.cross(out.cross(kZ)), 2 * kTube + 2 * kGap, 2 * kTube, 150));
+                                  way.cross(out.cross(kZ)), 2 * kTube + 2 * kGap, 2 * kTube, kBack));
     }
   }
 }
@@ -129,7 +141,7 @@ void contact_bridge(ExamplePart& part) {
   part.gripper = gripper(24, {2.5, 6, 30}, 18, 0.4);
   const auto add = [&](const std::string& name, const Vector3d& tips, const Vector3d& way, const Vector3d& jaws,
                        double width) {
-    part.grasps.push_back(grasp(name, tips, way, jaws, width + 2 * kGap, width, 60));
+    part.grasps.push_back(grasp(name, tips, way, jaws, width + 2 * kGap, width, 20));
   };
   // The waist is a plate from z = 2 to 6; the floor may be right behind it.
   add("waist_top", 0.5 * kZ, -kZ, kY, 10.8);

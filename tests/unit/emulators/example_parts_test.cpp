@@ -126,7 +126,7 @@ TEST(ExampleParts, AreWrittenAsStlAndToml) {
   EXPECT_NE(text.str().find("mesh = \"track_link.stl\"\nscanner = \"lms400\"\n"), std::string::npos);
   EXPECT_NE(
       text.str().find("[[grasp]]\nname = \"bridge_top\"\nT_object_tcp = { xyz_mm = [0, 0, -14], rpy_deg = [180, 0, "
-                      "90] }\napproach_mm = 150\nopening_mm = 95\nholding_mm = 80\n"),
+                      "90] }\napproach_mm = 50\nopening_mm = 95\nholding_mm = 80\n"),
       std::string::npos);
   const auto read = config::load_part(path);
   ASSERT_TRUE(read) << to_string(read.error().front());
