@@ -14,4 +14,5 @@ void add_scan(CLI::App& app, int& exit_status);
 void add_train(CLI::App& app, int& exit_status);
 void add_detect(CLI::App& app, int& exit_status);
 void add_export(CLI::App& app, int& exit_status);
+void add_replay(CLI::App& app, int& exit_status);
 }  // namespace binpick::tools

@@ -35,6 +35,7 @@ int main(int argc, char** argv) {
   tools::add_train(app, exit_status);
   tools::add_detect(app, exit_status);
   tools::add_export(app, exit_status);
+  tools::add_replay(app, exit_status);
   // CLI11 would only say that a subcommand is missing.
   if (argc > 1 && argv[1][0] != '-') {
     std::string names;

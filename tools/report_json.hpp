@@ -1,0 +1,11 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "vision/detector.hpp"
+
+namespace binpick::tools {
+/// A detection's report as other programs read it.
+nlohmann::json to_json(const std::string& part, const vision::DetectionReport& report);
+}  // namespace binpick::tools
