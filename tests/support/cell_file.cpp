@@ -47,6 +47,7 @@ void write_scanner(std::ostream& out, const CellFile& file) {
 std::string to_toml(const CellFile& file) {
   const Layout layout = layout_of(file);
   std::ostringstream out;
+  if (!file.record_dir.empty()) out << "[record]\ndir = \"" << file.record_dir << "\"\n\n";
   out << "[cell]\nname = \"test\"\nstate_dir = \"" << file.state_dir << "\"\npicture_dir = \"" << file.picture_dir
       << "\"\n\n[plc]\nrole = \"" << file.plc_role << (file.plc_role == "client" ? "\"\naddress" : "\"\nlisten")
       << " = \"127.0.0.1:" << file.plc_port << "\"\nword_order = \"" << file.word_order << "\"\npose_convention = \""

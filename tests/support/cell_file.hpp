@@ -32,6 +32,7 @@ struct CellFile {
   bool locate = false;  ///< The first supply, by its rim.
   std::string state_dir;
   std::string picture_dir;
+  std::string record_dir;
   // Sockets, for tests that use them; in memory nobody looks at them.
   std::uint16_t plc_port = 1502, can_port = 20000, can_listen_port = 0, scanner_port = 2111;
   std::uint16_t robot_port = 5002;  ///< 0: no robot connects.
