@@ -24,7 +24,7 @@ std::string spoken_to(const CLI::App& app) {
 int main(int argc, char** argv) {
   using namespace binpick;
   CLI::App app{
-      "The command beside binpickd: check a cell, reach its devices, train parts, detect them, program its PLC.",
+      "The command beside binpickd: check and calibrate a cell, reach its devices, train parts, detect them, program its PLC.",
       "binpick"};
   app.require_subcommand(1);
   app.set_version_flag("--version", "binpick " BINPICK_VERSION);
@@ -32,6 +32,7 @@ int main(int argc, char** argv) {
   tools::add_check(app, exit_status);
   tools::add_probe(app, exit_status);
   tools::add_scan(app, exit_status);
+  tools::add_calibrate(app, exit_status);
   tools::add_train(app, exit_status);
   tools::add_detect(app, exit_status);
   tools::add_export(app, exit_status);
