@@ -30,7 +30,8 @@ struct PickResult {
   std::uint16_t part_id = 0;
   std::uint16_t objects_left = 0;  ///< Found and not yet picked, this one not counted.
   std::uint16_t fill_level_percent = 0;
-  double score = 0;  ///< 0 … 1.
+  Unreachable unreachable = Unreachable::None;  ///< With NotReachable: of most objects.
+  double score = 0;                             ///< 0 … 1.
   Transform<frame::Base, frame::Tcp> T_base_approach;
   Transform<frame::Base, frame::Tcp> T_base_grasp;
   CycleFigures figures;

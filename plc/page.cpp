@@ -327,6 +327,12 @@ std::string registers_page() {
   for (const ResultText& r : result_table())
     out += "| " + std::to_string(static_cast<unsigned>(r.code)) + " | " + std::string(r.name) + " | " +
            std::string(r.cause) + " | " + std::string(r.cure) + " |\n";
+  out +=
+      "\n### Reasons of \"found but not reachable\" (`unreachable_reason`)\n\n| code | name | what to do "
+      "|\n|---|---|---|\n";
+  for (const UnreachableText& u : unreachable_table())
+    out += "| " + std::to_string(static_cast<unsigned>(u.reason)) + " | " + std::string(u.name) + " | " +
+           std::string(u.cure) + " |\n";
   out += "\n## Alarms\n\n| code | name | cause | cure |\n|---|---|---|---|\n";
   for (const AlarmText& a : alarm_table())
     out += "| " + std::to_string(static_cast<unsigned>(a.alarm)) + " | " + std::string(a.name) + " | " +

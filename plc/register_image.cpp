@@ -38,6 +38,7 @@ void RegisterImage::put_result(const PickRequest& request, const PickResult& res
   put(at("result_supply_id"), request.supply_id);
   put(at("objects_left"), result.objects_left);
   put(at("fill_level"), result.fill_level_percent);
+  put(at("unreachable_reason"), static_cast<std::uint16_t>(result.unreachable));
   put_long(at("score"), static_cast<float>(result.score));
   if (result.code == ResultCode::PickFound) {
     const auto approach = pose_numbers(result.T_base_approach.iso, convention);

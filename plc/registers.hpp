@@ -92,7 +92,7 @@ inline constexpr std::array kRegisters{
     Register{"result_supply_id", 44, Type::U16, Direction::CellToPlc, "", "Supply that was asked for."},
     Register{"objects_left", 45, Type::U16, Direction::CellToPlc, "", "Objects found beside this one."},
     Register{"fill_level", 46, Type::U16, Direction::CellToPlc, "%", "How full the supply is, by volume."},
-    Register{"result_reserved_47", 47, Type::U16, Direction::CellToPlc, "", "0."},
+    Register{"unreachable_reason", 47, Type::U16, Direction::CellToPlc, "", "With result code 12: why most of the objects cannot be taken, see the table of reasons. Else 0."},
     Register{"score", 48, Type::F32, Direction::CellToPlc, "", "Probability that the detection is right, 0 … 1."},
     Register{"approach_x", 50, Type::F32, Direction::CellToPlc, "m or mm", "Approach pose: the tcp in the robot's base, in the configured convention."},
     Register{"approach_y", 52, Type::F32, Direction::CellToPlc, "m or mm", ""},

@@ -13,10 +13,10 @@ constexpr std::array kResults{
     ResultText{ResultCode::NothingFound, "nothing found",
                "Something lies in the supply, but no object of this part was recognised.",
                "Check that the right part is in the supply, and little else; stir or tilt it, then request again."},
-    ResultText{
-        ResultCode::NotReachable, "found but not reachable",
-        "Objects were found, but each grasp is too steep or leaves the supply's walls.",
-        "Stir the supply, then request again; check reach.tilt_max_deg and the part's grasps if it happens often."},
+    ResultText{ResultCode::NotReachable, "found but not reachable",
+               "Objects were found, but each grasp is too steep, too far away, or hits something; unreachable_reason "
+               "tells what.",
+               "Stir the supply, then request again; the table of reasons says what to look at if it happens often."},
     ResultText{ResultCode::UnknownPart, "unknown part", "No [[part]] of the cell file has this id.",
                "Correct part_id in the PLC, or add the recipe to the cell file and reload."},
     ResultText{ResultCode::UnknownSupply, "unknown supply", "No [[supply]] of the cell file has this id.",
@@ -38,9 +38,31 @@ constexpr std::array kResults{
                "Read first_alarm, remove its cause, raise reset, request with a new sequence number."},
 };
 static_assert(std::ranges::is_sorted(kResults, {}, &ResultText::code));
+
+constexpr std::array kUnreachable{
+    UnreachableText{Unreachable::NoGrasp, "no grasp", "Add a [[grasp]] to the part file."},
+    UnreachableText{Unreachable::Tilt, "too steep",
+                    "Stir the supply; check reach.tilt_max_deg, add grasps from other "
+                    "sides."},
+    UnreachableText{Unreachable::Reach, "out of the robot's reach",
+                    "Put the supply nearer; check reach.radius_max_mm and reach.axis_min_mm."},
+    UnreachableText{Unreachable::Wall, "wall in the way",
+                    "Objects lie in corners: stir the supply; check its size and place, and reach.wall_clearance_mm."},
+    UnreachableText{Unreachable::GripperHitsPart, "gripper hits the part itself",
+                    "The part file is wrong: correct opening_mm, T_object_tcp or the gripper's geometry."},
+    UnreachableText{Unreachable::Covered, "something lies on it", "Stir the supply."},
+    UnreachableText{Unreachable::Floor, "floor in the way",
+                    "Check the height of T_base_supply; add grasps that reach less deep."},
+    UnreachableText{Unreachable::Neighbour, "neighbour in the way",
+                    "Stir the supply; add grasps, or check reach.clearance_mm."},
+    UnreachableText{Unreachable::Unmeasured, "nothing was measured beside it",
+                    "Clean the scanner, or scan from another side; check reach.unmeasured."},
+};
+static_assert(std::ranges::is_sorted(kUnreachable, {}, &UnreachableText::reason));
 }  // namespace
 
 std::span<const ResultText> result_table() { return kResults; }
+std::span<const UnreachableText> unreachable_table() { return kUnreachable; }
 
 std::string_view to_string(ResultCode code) {
   if (code == ResultCode::None) return "none";

@@ -31,4 +31,25 @@ struct ResultText {
 std::span<const ResultText> result_table();
 /// The name in result_table(); "none" for None, "unknown result code" for any other number.
 std::string_view to_string(ResultCode code);
+
+/// Why objects that were found cannot be taken, as the PLC reads it. Values never change.
+enum class Unreachable : std::uint16_t {
+  None = 0,
+  NoGrasp = 1,
+  Tilt = 2,
+  Reach = 3,
+  Wall = 4,
+  GripperHitsPart = 5,
+  Covered = 6,
+  Floor = 7,
+  Neighbour = 8,
+  Unmeasured = 9,
+};
+struct UnreachableText {
+  Unreachable reason;
+  std::string_view name;
+  std::string_view cure;
+};
+/// All reasons in order; None is not among them.
+std::span<const UnreachableText> unreachable_table();
 }  // namespace binpick::plc

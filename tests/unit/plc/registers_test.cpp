@@ -81,6 +81,10 @@ TEST(Tables, EveryCodeHasNameCauseAndCure) {
     EXPECT_EQ(to_string(text.code), text.name);
   }
   EXPECT_EQ(result_table().size(), 11U);
+  for (const UnreachableText& text : unreachable_table()) {
+    EXPECT_FALSE(text.name.empty() || text.cure.empty());
+    EXPECT_NE(text.reason, Unreachable::None);
+  }
   EXPECT_EQ(to_string(Alarm::None), "none");
   EXPECT_EQ(to_string(static_cast<Alarm>(9999)), "unknown alarm");
   EXPECT_EQ(to_string(ResultCode::None), "none");

@@ -98,11 +98,13 @@ TEST(Session, TheThreeEmptyOutcomesDiffer) {
     result.code = code;
     result.part_id = 1;
     result.objects_left = code == ResultCode::NotReachable ? 3 : 0;
+    if (code == ResultCode::NotReachable) result.unreachable = Unreachable::Neighbour;
     rig.session.publish(result, rig.now);
     EXPECT_TRUE(rig.has(status::kResultValid));
     EXPECT_EQ(rig.code(), code);
     EXPECT_EQ(rig.word(at("pick_id")), 0);
     EXPECT_EQ(rig.word(at("objects_left")), result.objects_left);
+    EXPECT_EQ(rig.word(at("unreachable_reason")), code == ResultCode::NotReachable ? 8 : 0);
     for (std::uint16_t i = at("approach_x"); i < at("sweep_ms"); ++i) EXPECT_EQ(rig.word(i), 0) << "no pose";
     EXPECT_EQ(rig.word(at("picks_total")), 0);
     rig.acknowledge(5);
