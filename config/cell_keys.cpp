@@ -299,13 +299,13 @@ const std::vector<Section<Config>>& cell_sections() {
            {{.name = "wall_clearance_mm", .type = Number, .unit = "mm", .max = 1000, .default_value = "0",
              .help = "The tcp stays this far inside the supply's walls."},
             [](C& c) -> Slot { return &c.reach.wall_clearance_mm; }},
-           {{.name = "clearance_mm", .type = Number, .unit = "mm", .max = 1000, .sample = "3",
-             .help = "Gripper and held part stay this far from walls, floor and all that was measured. Default: twice "
-                     "the noise of the part's scanner class."},
+           {{.name = "clearance_mm", .type = Number, .unit = "mm", .max = 1000, .sample = "1",
+             .help = "Gripper and held part stay this far from walls, floor and all that was measured. Default: 0.3 of "
+                     "the noise of the part's scanner class. Where there is more room, a grasp goes first."},
             [](C& c) -> Slot { return &c.reach.clearance_mm; }},
            {{.name = "unmeasured", .type = Choice, .default_value = "\"blocked\"", .choices = {"free", "blocked"},
-             .help = "What stands where the scanner saw nothing: nothing, or something as high as the highest that was "
-                     "measured around that place."},
+             .help = "What stands where the scanner saw nothing: nothing; or what surrounds that place goes on in it, and "
+                     "a shadow hides as much as it can. With \"free\" such grasps are still the last choice."},
             [](C& c) -> Slot {
               using enum vision::Unmeasured;
               return chosen(c.reach.unmeasured, {Free, Blocked});

@@ -8,6 +8,14 @@
 
 namespace binpick::daemon {
 namespace {
+/// Both name their values by the same numbers.
+plc::Unreachable as_plc_reads(vision::Obstacle obstacle) {
+  using vision::Obstacle;
+  static_assert(static_cast<int>(plc::Unreachable::Tilt) == static_cast<int>(Obstacle::Tilt));
+  static_assert(static_cast<int>(plc::Unreachable::GripperHitsPart) == static_cast<int>(Obstacle::Itself));
+  static_assert(static_cast<int>(plc::Unreachable::Unmeasured) == static_cast<int>(Obstacle::Unmeasured));
+  return static_cast<plc::Unreachable>(obstacle);
+}
 /// Of the supply: a scan that saw less and has found nothing tells little of it.
 constexpr double kMeasuredMin = 0.3;
 /// To the start of a sweep the pivot drives with this share of what the module can do.
@@ -300,6 +308,8 @@ void Cell::publish(TimePoint now) {
     answer.code = found > 0           ? plc::ResultCode::NotReachable
                   : scan.supply_empty ? plc::ResultCode::SupplyEmpty
                                       : plc::ResultCode::NothingFound;
+    if (answer.code == plc::ResultCode::NotReachable)
+      answer.unreachable = as_plc_reads(vision::main_obstacle(scan.choice));
     // The robot's codes for "no pick" are the PLC's result codes.
     robot_.withdraw(static_cast<drivers::robot::NoPick>(answer.code));
     tell_why_none(scan);

@@ -2,6 +2,7 @@
 
 #include <cstdio>
 #include <exception>
+#include <map>
 #include <string>
 
 #include "base/log.hpp"
@@ -17,12 +18,29 @@ void draw(const DetectRequest& request, const DetectResult& result) noexcept {
     char name[32];
     std::snprintf(name, sizeof name, "/cycle-%06llu.png", static_cast<unsigned long long>(request.cycle_id));
     const auto* chosen = result.choice.reachable.empty() ? nullptr : &result.choice.reachable.front();
+    const auto& part = request.cell->config.recipes[request.recipe].part;
     const auto drawn = vision::draw_report(dir + name, request.image, request.cell->knowledge_bases[request.recipe],
-                                           result.report, chosen);
+                                           result.report, chosen, part.gripper ? &*part.gripper : nullptr,
+                                           chosen != nullptr ? &part.grasps[chosen->grasp] : nullptr);
     if (!drawn) BINPICK_LOG(Warning, "vision", "no picture: %s", drawn.error().c_str());
   } catch (const std::exception& failure) {
     BINPICK_LOG(Warning, "vision", "no picture: %s", failure.what());
   }
+}
+/// One line for each grasp of each object: in how many poses it was tried in vain, and why in the best of them.
+void tell_rejected(const DetectRequest& request, const DetectResult& result) {
+  const auto& rejected = result.choice.rejected;
+  const auto& grasps = request.cell->config.recipes[request.recipe].part.grasps;
+  std::map<std::pair<std::size_t, std::size_t>, std::pair<int, const vision::RejectedGrasp*>> of;
+  for (const auto& one : rejected) {
+    auto& [count, last] = of[{one.detection, one.grasp}];
+    ++count;
+    if (last == nullptr || one.why > last->why) last = &one;
+  }
+  for (const auto& [which, told] : of)
+    BINPICK_LOG(Debug, "vision", "cycle %llu: object %zu, grasp %zu \"%s\": %d rejected, %s",
+                static_cast<unsigned long long>(request.cycle_id), which.first, which.second,
+                grasps[which.second].name.c_str(), told.first, to_string(*told.second).c_str());
 }
 }  // namespace
 
@@ -46,6 +64,7 @@ void VisionWorker::work() {
     // The loop takes results faster than detections are made; a full box means that nobody listens any more.
     if (!results_.try_push(std::move(result))) BINPICK_LOG(Error, "vision", "a result found no taker");
     wake_loop_();
+    tell_rejected(*request, to_draw);
     draw(*request, to_draw);
     busy_ = false;
   }

@@ -9,6 +9,7 @@
 
 #include "vision/rasteriser.hpp"
 #include "vision/scene.hpp"
+#include "vision/swept.hpp"
 
 namespace binpick::vision {
 namespace {
@@ -205,6 +206,26 @@ cv::Mat legend(const Canvas& canvas, const KnowledgeBase& part, const DetectionR
   return strip;
 }
 
+/// Jaws as they come in and, thinner, the body above them, from above.
+void draw_gripper(Canvas& canvas, const Reachable& chosen, const Gripper& gripper, const Grasp& grasp) {
+  const std::vector<Gripper::Solid> solids =
+      solids_of(gripper, grasp.opening_mm.value_or(gripper.jaws ? gripper.jaws->opening_max_mm : 0));
+  for (std::size_t i = 0; i < solids.size(); ++i) {
+    const Swept body{solids[i], chosen.T_supply_grasp.iso, Eigen::Vector3d::Zero()};
+    std::vector<cv::Point> corners, outline;
+    for (std::size_t signs = 0; signs < std::size_t{1} << body.edges_mm().size(); ++signs) {
+      Eigen::Vector3d corner = body.middle_mm();
+      for (std::size_t k = 0; k < body.edges_mm().size(); ++k)
+        corner += ((signs >> k & 1) != 0 ? 1.0 : -1.0) * body.edges_mm()[k];
+      corners.emplace_back(canvas.at(corner.x(), corner.y()));
+    }
+    cv::convexHull(corners, outline);
+    const int pen = i < gripper.body.size() ? 1 : 2;
+    cv::polylines(canvas.picture, outline, true, kHalo, pen + 2, cv::LINE_AA);
+    cv::polylines(canvas.picture, outline, true, kChosen, pen, cv::LINE_AA);
+  }
+}
+
 void draw_grasp(Canvas& canvas, const Reachable& chosen) {
   const Eigen::Vector3d grasp = chosen.T_supply_grasp.iso.translation();
   const Eigen::Vector3d from = chosen.T_supply_approach.iso.translation();
@@ -217,7 +238,8 @@ void draw_grasp(Canvas& canvas, const Reachable& chosen) {
 }  // namespace
 
 Expected<void, std::string> draw_report(const std::string& png_path, const DepthImage& image, const KnowledgeBase& part,
-                                        const DetectionReport& report, const Reachable* chosen) {
+                                        const DetectionReport& report, const Reachable* chosen, const Gripper* gripper,
+                                        const Grasp* grasp) {
   if (image.z_mm.size() == 0) return unexpected(png_path + ": there is no depth image to draw; give one with pixels");
   const auto cols = static_cast<int>(image.z_mm.cols());
   Canvas canvas;
@@ -256,6 +278,7 @@ Expected<void, std::string> draw_report(const std::string& png_path, const Depth
     write_text(canvas.picture, format("%zu: %.2f", k + 1, detection.score), label_place(detection.T_supply_object), 0.5,
                colour_of(detection.score), true);
   }
+  if (chosen != nullptr && gripper != nullptr && grasp != nullptr) draw_gripper(canvas, *chosen, *gripper, *grasp);
   if (chosen != nullptr) draw_grasp(canvas, *chosen);
 
   cv::Mat whole;

@@ -8,6 +8,8 @@
 #include <limits>
 #include <numbers>
 
+#include "vision/clearance.hpp"
+
 namespace binpick::vision {
 namespace {
 constexpr double kDegree = std::numbers::pi / 180.0;
@@ -15,8 +17,15 @@ constexpr double kRevolutionStep = 15 * kDegree;
 /// Probabilities closer than this are equal; then the higher object goes first, as nothing lies on it.
 constexpr double kProbabilityStep = 0.02;
 constexpr double kHoldsMm = 3, kHoldsRad = 3 * kDegree;
-/// Makes millimetres outside a wall and radians over the tilt limit comparable, to name the least bad grasp.
-constexpr double kMillimetresPerRadian = 200.0;
+/// More room than so many clearances is not asked for.
+constexpr std::array kRoom{4.0, 2.0, 1.0};
+/// The clearance where none is given, in standard deviations of a height. It is the least: where there is more room, a
+/// grasp goes first.
+constexpr double kClearanceNoises = 0.3;
+/// Free grasps of one detection that are looked at for more room.
+constexpr int kFreeMax = 12;
+/// Tilts that differ by less than one over this are equal.
+constexpr double kTiltSteps = 1e5;
 
 Eigen::Matrix3d turn(double angle_rad, const Eigen::Vector3d& axis) {
   return Eigen::AngleAxisd(angle_rad, axis).toRotationMatrix();
@@ -45,37 +54,174 @@ Eigen::Isometry3d about(const Eigen::Vector3d& centre_mm, const Eigen::Matrix3d&
   return T;
 }
 
-struct Obstacle {
-  double badness = 0;  ///< 0: reachable.
-  std::string reason;
+/// A grasp in one of its poses.
+struct Candidate {
+  std::size_t grasp = 0;
+  std::size_t pose = 0;  ///< Of poses_of().
+  Eigen::Isometry3d T_supply_tcp;
+  double tilt_rad = 0;
 };
 
-Obstacle obstacle(const Eigen::Isometry3d& T_supply_tcp, double tilt_rad, const SupplyBox& supply,
-                  const ReachLimits& limits) {
-  std::array<char, 120> text{};
-  if (tilt_rad > limits.tilt_max_rad) {
-    std::snprintf(text.data(), text.size(), "tilt %.0f deg is over %.0f deg", tilt_rad / kDegree,
-                  limits.tilt_max_rad / kDegree);
-    return {(tilt_rad - limits.tilt_max_rad) * kMillimetresPerRadian, text.data()};
+RejectedGrasp beyond_limits(const Candidate& candidate, const Grasp& grasp, const SupplyBox& supply,
+                            const ReachLimits& limits) {
+  RejectedGrasp found;
+  found.grasp = candidate.grasp;
+  found.pose = candidate.pose;
+  const auto rejected = [&](Obstacle why, double value, double limit, const char* place = "") {
+    found.why = why, found.value = value, found.limit = limit, found.place = place;
+    return found;
+  };
+  if (candidate.tilt_rad > limits.tilt_max_rad)
+    return rejected(Obstacle::Tilt, candidate.tilt_rad, limits.tilt_max_rad);
+  for (const double back_mm : {0.0, grasp.approach_mm}) {
+    const Eigen::Vector3d at = limits.T_base_supply.iso * (candidate.T_supply_tcp * Eigen::Vector3d(0, 0, -back_mm));
+    if (limits.radius_max_mm > 0 && at.norm() > limits.radius_max_mm)
+      return rejected(Obstacle::Reach, at.norm(), limits.radius_max_mm, "the base");
+    if (at.head<2>().norm() < limits.axis_min_mm)
+      return rejected(Obstacle::Reach, at.head<2>().norm(), limits.axis_min_mm, "the base's z axis");
   }
-  if (supply.size_mm.x() <= 0 || supply.size_mm.y() <= 0) return {};
+  if (supply.size_mm.x() <= 0 || supply.size_mm.y() <= 0) return found;
   constexpr std::array<const char*, 2> kMin{"wall x min", "wall y min"}, kMax{"wall x max", "wall y max"};
-  Obstacle worst;
   for (std::size_t axis = 0; axis < 2; ++axis) {
     const auto at = static_cast<Eigen::Index>(axis);
-    const double position = T_supply_tcp.translation()[at];
+    const double position = candidate.T_supply_tcp.translation()[at];
     const double outside = std::abs(position) - (0.5 * supply.size_mm[at] - limits.wall_clearance_mm);
-    if (outside <= 1e-9 || outside <= worst.badness) continue;
-    const char* wall = position > 0 ? kMax[axis] : kMin[axis];
-    if (limits.wall_clearance_mm > 0)
-      std::snprintf(text.data(), text.size(), "tcp %.0f mm too near to or outside the %s (clearance %.0f mm)", outside,
-                    wall, limits.wall_clearance_mm);
-    else
-      std::snprintf(text.data(), text.size(), "tcp %.0f mm outside the %s", outside, wall);
-    worst = {outside, text.data()};
+    if (outside > 1e-9 && outside > found.value)
+      rejected(Obstacle::Wall, outside, limits.wall_clearance_mm, position > 0 ? kMax[axis] : kMin[axis]);
   }
-  return worst;
+  return found;
 }
+
+/// Of two rejected ones, that which got farther in the tests. Of those that leave the limits the one that does so
+/// least; the others come in the order of their rank.
+bool got_farther(const RejectedGrasp& a, const RejectedGrasp& b) {
+  const auto stage = [](const RejectedGrasp& r) {
+    const bool gripper_at_wall = r.why == Obstacle::Wall && r.place.empty();
+    return gripper_at_wall || r.why > Obstacle::Covered ? Obstacle::Floor : r.why;
+  };
+  if (stage(a) != stage(b)) return stage(a) > stage(b);
+  return stage(a) < Obstacle::Itself && std::abs(a.value - a.limit) < std::abs(b.value - b.limit);
+}
+
+/// What one scan says of all its grasps.
+class Checks {
+ public:
+  Checks(const DetectionReport& report, const std::vector<Grasp>& grasps, const SupplyBox& supply,
+         const ReachLimits& limits, const GripperScene& scene)
+      : report_{report},
+        grasps_{grasps},
+        supply_{supply},
+        scene_{scene},
+        clearance_mm_{limits.clearance_mm.value_or(kClearanceNoises * scene.noise_mm)},
+        part_{scene.part},
+        around_{scene.image, supply, part_, report.detections, scene.noise_mm},
+        holes_{limits.unmeasured == Unmeasured::Blocked},
+        highest_mm_{static_cast<double>(around_.highest_mm())},
+        hits_part_(grasps.size()) {
+    for (const Grasp& grasp : grasps) sweepers_.push_back(sweepers_of(scene.gripper, grasp));
+  }
+
+  /// Takes up the next detection.
+  void begin(std::size_t detection, const std::vector<Candidate>& candidates) {
+    detection_ = detection;
+    // As wide as anything of the gripper reaches that is not above all.
+    Eigen::AlignedBox2d window;
+    for (const Candidate& candidate : candidates)
+      for (const Gripper::Solid& solid : sweepers_[candidate.grasp]) {
+        const Eigen::AlignedBox3d box = box_of(solid, candidate, kRoom.front());
+        if (box.min().z() < highest_mm_) {
+          window.extend(Eigen::Vector2d{box.min().head<2>()});
+          window.extend(Eigen::Vector2d{box.max().head<2>()});
+        }
+      }
+    if (window.isEmpty()) window.extend(Eigen::Vector2d{candidates.front().T_supply_tcp.translation().head<2>()});
+    // What stands beside it may hide something within.
+    const Eigen::Vector2d margin = Eigen::Vector2d::Constant(0.4 * std::min(highest_mm_, kHiddenMm));
+    heights_ = around_.without(detection, {window.min() - margin, window.max() + margin});
+    lower_side_.reset();
+    covered_ = around_.covered_pixels(detection);
+  }
+
+  /// None: it is free, with `clearance_mm` around it.
+  RejectedGrasp check(const Candidate& candidate, double& clearance_mm) {
+    RejectedGrasp found{detection_, candidate.grasp, candidate.pose};
+    const Grasp& grasp = grasps_[candidate.grasp];
+    std::optional<bool>& itself = hits_part_[candidate.grasp];
+    // Meshes are simplified by up to a third of the noise.
+    if (!itself) itself = hits_part(scene_.gripper, grasp, scene_.part, 0.2 + scene_.noise_mm / 3);
+    if (*itself) {
+      found.why = Obstacle::Itself;
+      return found;
+    }
+    if (covered_ > kCoveredPx) {
+      found.why = Obstacle::Covered;
+      found.value = covered_ * scene_.image.pixel_mm * scene_.image.pixel_mm;
+      return found;
+    }
+    if (const Contact hit = contact_of_gripper(candidate, 1, holes_); hit.with != Obstacle::None) {
+      found.why = hit.with, found.value = hit.depth_mm;
+      return found;
+    }
+    if (!lower_side_) lower_side_ = around_.lower_side(detection_);
+    const Contact hit = contact_of_part(*lower_side_, scene_.image.origin_mm, -candidate.T_supply_tcp.linear().col(2),
+                                        grasp.approach_mm, kSlackNoises * scene_.noise_mm, heights_, supply_);
+    if (hit.with != Obstacle::None) {
+      found.why = hit.with, found.value = hit.depth_mm;
+      return found;
+    }
+    // Here what may stand in a hole counts in any case: if it is allowed, it is still the last choice.
+    for (const double times : kRoom)
+      if ((times == 1 && holes_) || contact_of_gripper(candidate, times, true).with == Obstacle::None) {
+        clearance_mm = times * clearance_mm_;
+        break;
+      }
+    return found;
+  }
+  bool is_roomy(double clearance_mm) const { return clearance_mm >= kRoom.front() * clearance_mm_; }
+
+ private:
+  /// Something that a shadow hides deeper than this is not met by jaws.
+  static constexpr double kHiddenMm = 100;
+  /// Pixels on an object that may be wrong.
+  static constexpr int kCoveredPx = 1;
+  static constexpr double kSlackNoises = 1;
+
+  Eigen::Vector3d way_of(const Candidate& candidate) const {
+    return -grasps_[candidate.grasp].approach_mm * candidate.T_supply_tcp.linear().col(2);
+  }
+  Eigen::AlignedBox3d box_of(const Gripper::Solid& solid, const Candidate& candidate, double times) const {
+    const Eigen::Isometry3d T = candidate.T_supply_tcp * solid.T_tcp_solid;
+    const Eigen::Vector3d half = T.linear().cwiseAbs() * (0.5 * solid.size_mm.array() + times * clearance_mm_).matrix();
+    Eigen::AlignedBox3d box{T.translation() - half, T.translation() + half};
+    const Eigen::AlignedBox3d begin = box.translated(way_of(candidate));
+    return box.extend(begin);
+  }
+  /// The first that is found: jaws are asked before the body.
+  Contact contact_of_gripper(const Candidate& candidate, double times, bool holes) const {
+    for (const Gripper::Solid& solid : sweepers_[candidate.grasp]) {
+      if (box_of(solid, candidate, times).min().z() >= std::max(highest_mm_, supply_.size_mm.z())) continue;
+      const Swept body{solid, candidate.T_supply_tcp, way_of(candidate), times * clearance_mm_};
+      if (const Contact found = contact(body, heights_, supply_, holes); found.with != Obstacle::None) return found;
+    }
+    return {};
+  }
+
+  const DetectionReport& report_;
+  const std::vector<Grasp>& grasps_;
+  const SupplyBox& supply_;
+  const GripperScene& scene_;
+  double clearance_mm_;
+  Rasteriser part_;
+  Surroundings around_;
+  bool holes_;  ///< Block the way.
+  double highest_mm_;
+  std::vector<std::vector<Gripper::Solid>> sweepers_;  ///< Of each grasp.
+  std::vector<std::optional<bool>> hits_part_;
+  std::size_t detection_ = 0;
+  Heights heights_;
+  std::optional<Template> lower_side_;
+  int covered_ = 0;
+};
 
 /// Of a normal error, in the direction in which it is largest.
 double within(double limit, const Eigen::Matrix3d& covariance) {
@@ -97,42 +243,125 @@ double probability_of_holding(const Detection& detection, const Symmetry& symmet
   return detection.score * within(kHoldsMm, detection.covariance.topLeftCorner<3, 3>()) * within(kHoldsRad, turn);
 }
 
+std::vector<Eigen::Isometry3d> poses_of(const Grasp& grasp, const Transform<frame::Supply, frame::Object>& object,
+                                        const Symmetry& symmetry) {
+  std::vector<Eigen::Isometry3d> poses;
+  for (const Eigen::Matrix3d& R : equivalent_turns(symmetry))
+    poses.push_back(object.iso * about(symmetry.centre_mm, R) * grasp.T_object_tcp.iso);
+  return poses;
+}
+
 GraspChoice choose_grasps(const DetectionReport& report, const Symmetry& symmetry, const std::vector<Grasp>& grasps,
-                          const SupplyBox& supply, const ReachLimits& limits) {
-  const std::vector<Eigen::Matrix3d> turns = equivalent_turns(symmetry);
+                          const SupplyBox& supply, const ReachLimits& limits, const GripperScene* scene) {
+  std::optional<Checks> checks;
+  if (scene != nullptr && !report.detections.empty()) checks.emplace(report, grasps, supply, limits, *scene);
   GraspChoice choice;
+  std::vector<Candidate> candidates;
   for (std::size_t d = 0; d < report.detections.size(); ++d) {
+    RejectedGrasp farthest{d, 0, 0, Obstacle::NoGrasp};
+    const auto reject = [&](RejectedGrasp rejected) {
+      rejected.detection = d;
+      if (got_farther(rejected, farthest)) farthest = rejected;
+      choice.rejected.push_back(rejected);
+    };
+    candidates.clear();
+    for (std::size_t g = 0; g < grasps.size(); ++g) {
+      std::size_t pose = 0;
+      for (const Eigen::Isometry3d& T : poses_of(grasps[g], report.detections[d].T_supply_object, symmetry)) {
+        Candidate candidate{g, pose++, T};
+        const Eigen::Vector3d approach = candidate.T_supply_tcp.linear().col(2);
+        candidate.tilt_rad = std::atan2(approach.head<2>().norm(), -approach.z());
+        const RejectedGrasp beyond = beyond_limits(candidate, grasps[g], supply, limits);
+        if (beyond.why == Obstacle::None)
+          candidates.push_back(candidate);
+        else
+          reject(beyond);
+      }
+    }
+    // The first of equally steep grasps stays the first: the integrator's order is a preference, too.
+    std::stable_sort(candidates.begin(), candidates.end(), [&](const Candidate& a, const Candidate& b) {
+      if (grasps[a.grasp].preference != grasps[b.grasp].preference)
+        return grasps[a.grasp].preference > grasps[b.grasp].preference;
+      return std::lround(a.tilt_rad * kTiltSteps) < std::lround(b.tilt_rad * kTiltSteps);
+    });
+    if (checks && !candidates.empty()) checks->begin(d, candidates);
     std::optional<Reachable> best;
-    double best_tilt = 0;
-    Obstacle least{std::numeric_limits<double>::infinity(), "the part has no grasp; add a [[grasp]] to its file"};
-    for (std::size_t g = 0; g < grasps.size(); ++g)
-      for (const Eigen::Matrix3d& R : turns) {
-        const Eigen::Isometry3d T_supply_tcp =
-            report.detections[d].T_supply_object.iso * about(symmetry.centre_mm, R) * grasps[g].T_object_tcp.iso;
-        const Eigen::Vector3d approach = T_supply_tcp.linear().col(2);
-        const double tilt = std::atan2(approach.head<2>().norm(), -approach.z());
-        Obstacle found = obstacle(T_supply_tcp, tilt, supply, limits);
-        if (found.badness > 0) {
-          if (found.badness < least.badness) least = std::move(found);
+    int free = 0;
+    for (const Candidate& candidate : candidates) {
+      if (best && (free >= kFreeMax || grasps[candidate.grasp].preference < grasps[best->grasp].preference)) break;
+      double clearance_mm = 0;
+      if (checks)
+        if (const RejectedGrasp hit = checks->check(candidate, clearance_mm); hit.why != Obstacle::None) {
+          reject(hit);
           continue;
         }
-        // The first of equally steep grasps: the integrator's order is a preference.
-        if (best && tilt >= best_tilt - 1e-6) continue;
-        best_tilt = tilt;
-        best = Reachable{d, g, {T_supply_tcp}, {T_supply_tcp * Eigen::Translation3d(0, 0, -grasps[g].approach_mm)}};
-      }
+      ++free;
+      if (!best || clearance_mm > best->clearance_mm)
+        best = Reachable{d,
+                         candidate.grasp,
+                         {candidate.T_supply_tcp},
+                         {candidate.T_supply_tcp * Eigen::Translation3d(0, 0, -grasps[candidate.grasp].approach_mm)},
+                         clearance_mm};
+      if (!checks || checks->is_roomy(clearance_mm)) break;
+    }
     if (best)
       choice.reachable.push_back(*best);
     else
-      choice.unreachable.push_back({d, least.reason});
+      choice.unreachable.push_back({d, farthest.why, to_string(farthest)});
   }
   std::vector<long> holds;
   for (const Detection& d : report.detections)
     holds.push_back(std::lround(probability_of_holding(d, symmetry) / kProbabilityStep));
   std::stable_sort(choice.reachable.begin(), choice.reachable.end(), [&](const Reachable& a, const Reachable& b) {
     if (holds[a.detection] != holds[b.detection]) return holds[a.detection] > holds[b.detection];
+    if (grasps[a.grasp].preference != grasps[b.grasp].preference)
+      return grasps[a.grasp].preference > grasps[b.grasp].preference;
+    if (a.clearance_mm != b.clearance_mm) return a.clearance_mm > b.clearance_mm;
     return a.T_supply_grasp.iso.translation().z() > b.T_supply_grasp.iso.translation().z();
   });
   return choice;
+}
+
+std::string to_string(const RejectedGrasp& rejected) {
+  std::array<char, 160> text{};
+  const auto say = [&](const char* pattern, auto... values) {
+    std::snprintf(text.data(), text.size(), pattern, values...);
+    return std::string{text.data()};
+  };
+  switch (rejected.why) {
+    case Obstacle::None:
+      return "free";
+    case Obstacle::NoGrasp:
+      return "the part has no grasp; add a [[grasp]] to its file";
+    case Obstacle::Tilt:
+      return say("tilt %.0f deg is over %.0f deg", rejected.value / kDegree, rejected.limit / kDegree);
+    case Obstacle::Reach:
+      return say("tcp %.0f mm from %s, %s than %.0f mm", rejected.value, rejected.place.c_str(),
+                 rejected.value > rejected.limit ? "more" : "less", rejected.limit);
+    case Obstacle::Wall:
+      if (rejected.place.empty()) return say("gripper or part %.0f mm within a wall or too near to it", rejected.value);
+      if (rejected.limit > 0)
+        return say("tcp %.0f mm too near to or outside the %s (clearance %.0f mm)", rejected.value,
+                   rejected.place.c_str(), rejected.limit);
+      return say("tcp %.0f mm outside the %s", rejected.value, rejected.place.c_str());
+    case Obstacle::Itself:
+      return "the gripper hits the part itself on its way in; correct opening_mm, T_object_tcp or the gripper";
+    case Obstacle::Covered:
+      return say("something lies on it, on %.0f mm2", rejected.value);
+    case Obstacle::Floor:
+      return say("gripper %.1f mm too near to the floor", rejected.value);
+    case Obstacle::Neighbour:
+      return say("gripper or part %.1f mm within what lies beside it", rejected.value);
+    case Obstacle::Unmeasured:
+      return say("gripper %.1f mm within what may stand where nothing was measured", rejected.value);
+  }
+  return "?";
+}
+
+Obstacle main_obstacle(const GraspChoice& choice) {
+  std::array<int, 10> count{};
+  for (const Unreachable& unreachable : choice.unreachable) ++count[static_cast<std::size_t>(unreachable.why)];
+  const auto most = std::max_element(count.begin(), count.end());
+  return *most > 0 ? static_cast<Obstacle>(most - count.begin()) : Obstacle::None;
 }
 }  // namespace binpick::vision

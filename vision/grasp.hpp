@@ -6,6 +6,8 @@
 
 #include "base/frames.hpp"
 #include "vision/detector.hpp"
+#include "vision/gripper.hpp"
+#include "vision/reach.hpp"
 
 namespace binpick::vision {
 /// How a gripper takes a part. The tcp's z axis is the direction of approach.
@@ -22,45 +24,60 @@ struct Grasp {
   double preference = 0;  ///< Of an object's grasps that are free, one with the highest value is taken.
 };
 
-/// What stands where nothing was measured.
-enum class Unmeasured {
-  Free,     ///< Nothing.
-  Blocked,  ///< Something as high as the highest that was measured at the border of that hole.
-};
-
-struct ReachLimits {
-  double tilt_max_rad = 0.7;     ///< Between tcp z and straight down (-z of the supply).
-  double wall_clearance_mm = 0;  ///< The tcp stays this far inside the supply's walls.
-  /// Gripper and held part stay this far from walls, floor and all that was measured; twice the noise if absent.
-  std::optional<double> clearance_mm = std::nullopt;
-  Unmeasured unmeasured = Unmeasured::Blocked;
-  double radius_max_mm = 0;  ///< Of the tcp from the origin of the robot's base; 0: no limit.
-  double axis_min_mm = 0;    ///< Of the tcp from the z axis of the robot's base.
-};
-
 /// Probability that a detection is right and lies so near to the truth that a grasp holds: its score, times what its
 /// covariance leaves within 3 mm and 3 degrees in the worst direction. A turn that the symmetry makes nothing of does
 /// not count. A wheel whose spokes are hidden is surely a wheel, and yet not the one to pick first.
 double probability_of_holding(const Detection& detection, const Symmetry& symmetry);
+
+/// The tcp at the grasp in each pose that the symmetry allows (a revolution in steps of 15 degrees).
+std::vector<Eigen::Isometry3d> poses_of(const Grasp& grasp, const Transform<frame::Supply, frame::Object>& object,
+                                        const Symmetry& symmetry);
 
 struct Reachable {
   std::size_t detection = 0;  ///< Index in the report.
   std::size_t grasp = 0;
   Transform<frame::Supply, frame::Tcp> T_supply_grasp;
   Transform<frame::Supply, frame::Tcp> T_supply_approach;
+  double clearance_mm = 0;  ///< So much room is all around; 0: nobody asked, or only where holes are free.
 };
+/// A grasp in one of the poses that the symmetry allows, and why it is not offered.
+struct RejectedGrasp {
+  std::size_t detection = 0;
+  std::size_t grasp = 0;
+  std::size_t pose = 0;  ///< Index in poses_of().
+  Obstacle why = Obstacle::None;
+  double value = 0, limit = 0;  ///< Radians for a tilt, else millimetres.
+  std::string place = {};       ///< "wall x max".
+};
+std::string to_string(const RejectedGrasp& rejected);
+
 struct Unreachable {
   std::size_t detection = 0;
+  Obstacle why = Obstacle::None;
   std::string reason;  ///< "tilt 51 deg is over 40 deg", "tcp 12 mm outside the wall x max".
 };
 struct GraspChoice {
-  /// At most one per detection, its steepest; best first: the surest to hold (in steps of 0.02), then the highest.
+  /// At most one per detection, best first: the surest to hold (in steps of 0.02), then the preferred grasp, then the
+  /// one with more room around it (up to four times the clearance), then the highest.
   std::vector<Reachable> reachable;
-  std::vector<Unreachable>
-      unreachable;  ///< Detections without any reachable grasp, with the reason of the least bad one.
+  /// Detections without any reachable grasp, with the reason of the best one of those that got farthest in the tests.
+  std::vector<Unreachable> unreachable;
+  std::vector<RejectedGrasp> rejected;  ///< All that were tried in vain, also those of detections that are reachable.
+};
+/// The reason that most of the unreachable have.
+Obstacle main_obstacle(const GraspChoice& choice);
+
+/// What has to be free around a grasp.
+struct GripperScene {
+  const DepthImage& image;
+  const Mesh& part;
+  double noise_mm;  ///< Of one measured height, 1 sd.
+  const Gripper& gripper;
 };
 
-/// Grasps are tried in every pose that the part's symmetry allows (a revolution in steps of 15 degrees).
+/// Grasps are tried in every pose that the part's symmetry allows: preferred ones first, steep ones before tilted ones.
+/// Of those that are free the first with plenty of room is taken, or else the roomiest. Without a scene only the tcp is
+/// kept from the walls, and the steepest of the preferred is taken.
 GraspChoice choose_grasps(const DetectionReport& report, const Symmetry& symmetry, const std::vector<Grasp>& grasps,
-                          const SupplyBox& supply, const ReachLimits& limits);
+                          const SupplyBox& supply, const ReachLimits& limits, const GripperScene* scene = nullptr);
 }  // namespace binpick::vision

@@ -55,7 +55,11 @@ DetectResult look(DetectRequest& request) {
 
   vision::ReachLimits limits = config.reach;
   if (recipe.tilt_max_rad) limits.tilt_max_rad = *recipe.tilt_max_rad;
-  result.choice = vision::choose_grasps(result.report, part.symmetry(), recipe.part.grasps, box, limits);
+  limits.T_base_supply = supply.T_base_supply;
+  std::optional<vision::GripperScene> scene;
+  if (recipe.part.gripper) scene.emplace(request.image, part.mesh(), part.noise_mm(), *recipe.part.gripper);
+  result.choice = vision::choose_grasps(result.report, part.symmetry(), recipe.part.grasps, box, limits,
+                                        scene ? &*scene : nullptr);
 
   Eigen::AlignedBox3f extents;
   for (const auto& vertex : part.mesh().vertices_mm) extents.extend(vertex);

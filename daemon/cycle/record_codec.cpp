@@ -218,22 +218,44 @@ void put(FieldWriter& out, const vision::GraspChoice& choice) {
     o.number(static_cast<std::uint32_t>(reachable.grasp));
     o.isometry(reachable.T_supply_grasp.iso);
     o.isometry(reachable.T_supply_approach.iso);
+    o.number(reachable.clearance_mm);
   });
   out.list(choice.unreachable, [](FieldWriter& o, const vision::Unreachable& unreachable) {
     o.number(static_cast<std::uint32_t>(unreachable.detection));
+    o.number(static_cast<std::uint8_t>(unreachable.why));
     o.text(unreachable.reason);
+  });
+  out.list(choice.rejected, [](FieldWriter& o, const vision::RejectedGrasp& rejected) {
+    o.number(static_cast<std::uint32_t>(rejected.detection));
+    o.number(static_cast<std::uint32_t>(rejected.grasp));
+    o.number(static_cast<std::uint32_t>(rejected.pose));
+    o.number(static_cast<std::uint8_t>(rejected.why));
+    o.number(rejected.value);
+    o.number(rejected.limit);
+    o.text(rejected.place);
   });
 }
 void take(FieldReader& in, vision::GraspChoice& choice) {
-  in.list(choice.reachable, 8 + 2 * kIsometryBytes, [](FieldReader& i, vision::Reachable& reachable) {
+  in.list(choice.reachable, 16 + 2 * kIsometryBytes, [](FieldReader& i, vision::Reachable& reachable) {
     reachable.detection = i.number<std::uint32_t>();
     reachable.grasp = i.number<std::uint32_t>();
     i.isometry(reachable.T_supply_grasp.iso);
     i.isometry(reachable.T_supply_approach.iso);
+    i.number(reachable.clearance_mm);
   });
-  in.list(choice.unreachable, 8, [](FieldReader& i, vision::Unreachable& unreachable) {
+  in.list(choice.unreachable, 9, [](FieldReader& i, vision::Unreachable& unreachable) {
     unreachable.detection = i.number<std::uint32_t>();
+    unreachable.why = static_cast<vision::Obstacle>(i.number<std::uint8_t>());
     i.text(unreachable.reason);
+  });
+  in.list(choice.rejected, 33, [](FieldReader& i, vision::RejectedGrasp& rejected) {
+    rejected.detection = i.number<std::uint32_t>();
+    rejected.grasp = i.number<std::uint32_t>();
+    rejected.pose = i.number<std::uint32_t>();
+    rejected.why = static_cast<vision::Obstacle>(i.number<std::uint8_t>());
+    i.number(rejected.value);
+    i.number(rejected.limit);
+    i.text(rejected.place);
   });
 }
 

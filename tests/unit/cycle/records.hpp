@@ -50,8 +50,10 @@ inline DetectResult result_of_all_fields() {
   result.report.time_ms = 88.5;
   result.report.stages_ms = {{"maxima", 1.5}, {"surface", 2.5}};
   result.choice.reachable = {
-      {0, 1, transform_of<frame::Supply, frame::Tcp>(1.1), transform_of<frame::Supply, frame::Tcp>(1.2)}};
-  result.choice.unreachable = {{1, "tilt 51 deg is over 40 deg"}};
+      {0, 1, transform_of<frame::Supply, frame::Tcp>(1.1), transform_of<frame::Supply, frame::Tcp>(1.2), 0.9}};
+  result.choice.unreachable = {{1, vision::Obstacle::Tilt, "tilt 51 deg is over 40 deg"}};
+  result.choice.rejected = {{1, 2, 3, vision::Obstacle::Tilt, 0.9, 0.7, ""},
+                            {0, 1, 0, vision::Obstacle::Wall, 12, 0, "wall x max"}};
   result.place.T_said_found.translation() = Eigen::Vector3d{3, 4, 0};
   result.place.turn_rad = 0.02;
   result.place.walls = 3;
