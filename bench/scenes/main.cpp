@@ -9,6 +9,7 @@
 #include "bench/scenes/calibrate.hpp"
 #include "bench/scenes/conveyor.hpp"
 #include "bench/scenes/figure7.hpp"
+#include "bench/scenes/grasps.hpp"
 #include "bench/scenes/memory.hpp"
 #include "bench/scenes/noise_truth.hpp"
 #include "bench/scenes/run.hpp"
@@ -131,6 +132,12 @@ int main(int argc, char** argv) {
   CLI::App* search_command = comparing("search", "votes beside the exhaustive search");
   CLI::App* ablation_command = comparing("ablation", "what each addition to the method brings");
 
+  CLI::App* grasps_command = comparing("grasps", "which objects of a pile are offered, and what the gripper hits");
+  vision::ReachLimits limits;
+  bool free = false;
+  grasps_command->add_option("--clearance-mm", limits.clearance_mm, "as in a cell file");
+  grasps_command->add_flag("--free", free, "nothing stands where nothing was measured");
+
   CLI::App* conveyor_command = app.add_subcommand("conveyor", "objects that lie by themselves on a belt");
   std::size_t belt_scenes = 100;
   add_run_options(*conveyor_command, options);
@@ -154,6 +161,8 @@ int main(int argc, char** argv) {
     if (*figure7_command) figure7(options, count, selection.shard, selection.shards);
     if (*alarms_command) alarms(options, selection, alarm_count);
     if (*settle_command) settle(options.piles, selection, alarm_count);
+    limits.unmeasured = free ? vision::Unmeasured::Free : vision::Unmeasured::Blocked;
+    if (*grasps_command) grasps(options, selection, scenes, limits);
     if (*conveyor_command) conveyor(options, selection, belt_scenes);
     if (*search_command) search(options, selection, scenes);
     if (*ablation_command) ablation(options, selection, scenes);
