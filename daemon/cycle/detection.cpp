@@ -55,7 +55,7 @@ DetectResult look(DetectRequest& request) {
 
   vision::ReachLimits limits = config.reach;
   if (recipe.tilt_max_rad) limits.tilt_max_rad = *recipe.tilt_max_rad;
-  limits.T_base_supply = supply.T_base_supply;
+  limits.T_base_supply.iso = supply.T_base_supply.iso * result.place.T_said_found;
   std::optional<vision::GripperScene> scene;
   if (recipe.part.gripper) scene.emplace(request.image, part.mesh(), part.noise_mm(), *recipe.part.gripper);
   result.choice = vision::choose_grasps(result.report, part.symmetry(), recipe.part.grasps, box, limits,
