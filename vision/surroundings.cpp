@@ -21,6 +21,8 @@ constexpr double kFitsNoises = 4;
 constexpr double kCoversNoises = 2.5;
 /// Pixels beside an outline whose heights are mixed of both sides.
 constexpr int kRimPx = 2;
+/// Pixels along a wall that hold points of it as well.
+constexpr double kWallPx = 2.5;
 
 /// Median of nine (Paeth, 1990), written so that the compiler does many at once.
 inline float median(std::array<float, 9> v) {
@@ -109,7 +111,8 @@ void Surroundings::forget_walls(const SupplyBox& supply) {
     for (Eigen::Index c = 0; c < measured_mm_.cols(); ++c) {
       const double x = std::abs(origin_mm_.x() + pixel_mm_ * static_cast<double>(c));
       const double y = std::abs(origin_mm_.y() + pixel_mm_ * static_cast<double>(r));
-      if (x > 0.5 * supply.size_mm.x() - pixel_mm_ || y > 0.5 * supply.size_mm.y() - pixel_mm_)
+      const double strip_mm = kWallPx * pixel_mm_;
+      if (x > 0.5 * supply.size_mm.x() - strip_mm || y > 0.5 * supply.size_mm.y() - strip_mm)
         measured_mm_(r, c) = kNothing;
     }
 }
@@ -163,9 +166,8 @@ int Surroundings::covered_pixels(std::size_t detection) const {
           std::isnan(drawn.top_mm[drawn.at(r, c)]))
         continue;
       const Around near = around(drawn, r, c);
-      // On the silhouette itself a neighbour at its side looks the same, unless it was found.
-      const bool sure = near.inner || owner_(row, col) >= 0;
-      if (sure && z > near.greatest + static_cast<float>(kCoversNoises * noise_mm_)) ++pixels;
+      // On the silhouette itself a neighbour at its side looks the same.
+      if (near.inner && z > near.greatest + static_cast<float>(kCoversNoises * noise_mm_)) ++pixels;
     }
   return pixels;
 }
