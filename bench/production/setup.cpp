@@ -58,7 +58,7 @@ listen = "127.0.0.1:5002"
 allow = []
 
 [reach]
-tilt_max_deg = 45
+tilt_max_deg = 50
 
 [picks]
 per_scan = 4
@@ -90,7 +90,7 @@ knowledge_base = "%s"
 const std::vector<ProductionPart>& production_parts() {
   static const std::vector<ProductionPart> parts{
       {"gear_shaft", "lms400", {600, 500, 300}, 30, 1500, 16, 16, 13, 0.03 * 190, 4},
-      {"track_link", "lms400", {800, 600, 300}, 24, 1600, 18, 16, 14, 0.03 * 230, 4},
+      {"track_link", "lms400", {1000, 800, 300}, 24, 1860, 19, 16, 16, 0.03 * 230, 4},
       {"steering_wheel", "lms400", {1000, 800, 400}, 10, 1860, 19, 16, 16, 0.03 * 370, 4},
       {"contact_bridge", "lps36", {300, 300, 120}, 40, 560, 19, 10, 0, 3, 3},
   };
