@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -83,6 +85,18 @@ struct Records {
   double size_max_mb = 500;  ///< Of all of them, in 10^6 bytes; the oldest go.
 };
 
+/// One finding, in the form file:line:col: message, the line, a caret, the remedy.
+struct Diagnostic {
+  std::string file;
+  int line = 0;
+  int column = 0;
+  int length = 1;       ///< Caret and tildes.
+  std::string message;  ///< What is wrong; what to do.
+  std::string source;   ///< The line itself.
+};
+/// Three lines without a final line end; one where there is no line to show.
+std::string to_string(const Diagnostic& diagnostic);
+
 struct Config {
   std::string path;
   std::string text;  ///< Its content, as it was read.
@@ -125,22 +139,19 @@ struct Config {
   const std::string& plc_line() const { return plc.role == plc::LineRole::Client ? plc.address : plc_listen; }
   /// Held by a daemon in the role of a client (base/lock_file.hpp).
   std::string lock_path() const { return state_dir.empty() ? "" : state_dir + "/lock"; }
+
+  /// Where the values stand that the file gives, without a message, by name: "cell.state_dir",
+  /// "part[0].knowledge_base".
+  std::map<std::string, Diagnostic, std::less<>> stands_at;
+  /// A finding about one of them; about the file as a whole where it does not stand there.
+  Diagnostic finding(const std::string& key, std::string message) const;
 };
 
-/// One finding, in the form file:line:col: message, the line, a caret, the remedy.
-struct Diagnostic {
-  std::string file;
-  int line = 0;
-  int column = 0;
-  int length = 1;       ///< Caret and tildes.
-  std::string message;  ///< What is wrong; what to do.
-  std::string source;   ///< The line itself.
-};
-/// Three lines without a final line end; one where there is no line to show.
-std::string to_string(const Diagnostic& diagnostic);
+/// Training needs a part's mesh; a cell that has been trained works without.
+enum class MeshFile { Needed, OfNoMatter };
 
 /// Validates everything and returns all findings at once. Part files are read too; knowledge bases are not opened.
-Expected<Config, std::vector<Diagnostic>> load(const std::string& path);
+Expected<Config, std::vector<Diagnostic>> load(const std::string& path, MeshFile mesh = MeshFile::Needed);
 /// The same for one PART.toml.
 Expected<Part, std::vector<Diagnostic>> load_part(const std::string& path);
 /// The same from text in memory. `path` names it in findings, and paths in it are relative to that one's folder.

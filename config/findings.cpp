@@ -100,6 +100,10 @@ void Findings::add(const Place& place, std::string message) {
     ++dropped_;
     return;
   }
+  findings_.push_back(at(place, std::move(message)));
+}
+
+Diagnostic Findings::at(const Place& place, std::string message) const {
   Diagnostic d;
   d.file = file_;
   d.line = place.line;
@@ -108,7 +112,7 @@ void Findings::add(const Place& place, std::string message) {
   d.message = std::move(message);
   if (place.line > 0 && static_cast<std::size_t>(place.line) <= lines_.size())
     d.source = lines_[static_cast<std::size_t>(place.line) - 1];
-  findings_.push_back(std::move(d));
+  return d;
 }
 
 std::vector<Diagnostic> Findings::take() {

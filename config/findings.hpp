@@ -26,6 +26,8 @@ class Findings {
 
   /// `message` says what is wrong; and, after a semicolon, what to do.
   void add(const Place& place, std::string message);
+  /// The same, not kept.
+  Diagnostic at(const Place& place, std::string message = {}) const;
   bool empty() const { return findings_.empty(); }
   /// In the order of the file.
   std::vector<Diagnostic> take();

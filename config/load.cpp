@@ -2,6 +2,7 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <set>
 
 #include "config/config.hpp"
 #include "config/document.hpp"
@@ -20,7 +21,8 @@ std::string resolved(const std::string& file, const std::string& path) {
   return (fs::path{file}.parent_path() / path).string();
 }
 
-Place end_of(const Document& document) { return {std::max(1, static_cast<int>(document.lines.size())), 1, 1}; }
+/// What stands nowhere is said of the file as a whole.
+constexpr Place kWholeFile{};
 
 std::string bracketed(const std::string& name, bool repeated) {
   return repeated ? "[[" + name + "]]" : "[" + name + "]";
@@ -60,8 +62,10 @@ std::vector<const Value*> as_entries(const Member& member, Findings& findings) {
 }
 
 /// Members of the root that are no section. `sections`: their names; `home`: the section that has a key of a name.
-void report_strangers(const Document& document, const std::vector<std::string>& sections,
-                      const std::map<std::string, std::string>& homes, Findings& findings) {
+/// Returns the sections that were meant: they are not missing, too.
+std::set<std::string> report_strangers(const Document& document, const std::vector<std::string>& sections,
+                                       const std::map<std::string, std::string>& homes, Findings& findings) {
+  std::set<std::string> meant;
   for (const auto& member : document.root.members) {
     if (std::find(sections.begin(), sections.end(), member.key) != sections.end()) continue;
     const bool is_section = member.value.kind == Value::Kind::Table || is_list_of_tables(member.value);
@@ -71,19 +75,22 @@ void report_strangers(const Document& document, const std::vector<std::string>& 
       remedy = "put it under " + home->second;
     } else if (const auto near = nearest(member.key, sections); !near.empty()) {
       remedy = "did you mean \"" + near + "\"?";
+      if (is_section) meant.insert(near);
     } else {
       for (const auto& name : sections) remedy += (remedy.empty() ? "there are: " : ", ") + name;
     }
     findings.add(member.key_place, (is_section ? "unknown section \"" : "unknown key \"") + printable(member.key) +
                                        (is_section ? "\"; " : "\" before any section; ") + remedy);
   }
+  return meant;
 }
-
-enum class MeshFile { Needed, OfNoMatter };
 
 /// Parses one part document. Findings are about the part file; `part` is whole only when there are none.
 std::vector<Diagnostic> read_part(Document document, Part& part, MeshFile mesh = MeshFile::Needed) {
   if (!document.usable) return document.findings;
+  if (const Member* supply = document.root.find("supply"); supply != nullptr && document.root.find("mesh") == nullptr)
+    return {Findings{document.file, document.lines}.at(
+        supply->key_place, "this is a cell file; give one of the part files that it names under [[part]]")};
   part.path = document.file;
   part.text = std::move(document.text);
   Findings findings{document.file, document.lines};
@@ -185,7 +192,7 @@ std::pair<std::vector<std::string>, std::map<std::string, std::string>> names_of
 }
 
 CellPlaces read_cell(const Document& document, Config& config, std::vector<std::string>& part_files,
-                     Findings& findings) {
+                     const std::set<std::string>& misspelt, Findings& findings) {
   const ReadContext context{findings, document.damaged_keys};
   CellPlaces places;
   places.damaged_keys = document.damaged_keys;
@@ -198,22 +205,30 @@ CellPlaces read_cell(const Document& document, Config& config, std::vector<std::
       continue;
     }
     for (const auto& key : section.keys) set_default(key.facts, key.slot(config));
-    places.sections[section.name].header = end_of(document);
+    places.sections[section.name].header = kWholeFile;
     places.sections[section.name].is_there = false;
-    if (member == nullptr) absent.push_back(&section);
+    if (member == nullptr && !misspelt.contains(section.name)) absent.push_back(&section);
   }
   // Which of their keys are required may depend on sections that come later.
   for (const auto* section : absent) {
-    std::string required;
+    std::string required, condition;
     for (const auto& key : section->keys)
-      if (key.facts.required && is_for(key.facts, config, places).value_or(false))
+      if (key.facts.required && is_for(key.facts, config, places).value_or(false)) {
         required += (required.empty() ? "" : ", ") + std::string{key.facts.name};
-    if (!required.empty())
-      findings.add(end_of(document),
-                   std::string{"section ["} + section->name + "] is missing; add it, with " + required);
+        condition = key.facts.only_for;
+      }
+    if (required.empty()) continue;
+    std::string message = std::string{"section ["} + section->name + "] is missing; add it, with " + required;
+    const bool on_pivot = condition.find("scanner.carrier") == 0;
+    if (on_pivot && places.sections["scanner"].is_there && !places.given("scanner", "carrier"))
+      findings.add(places.sections["scanner"].header,
+                   message + "; or, if the robot carries the scanner, write carrier = \"robot\" in [scanner]");
+    else
+      findings.add(kWholeFile, std::move(message));
   }
   const auto missing = [&](const char* name, const char* what) {
-    findings.add(end_of(document), std::string{"there is no [["} + name + "]]; add one for each " + what);
+    if (!misspelt.contains(name))
+      findings.add(kWholeFile, std::string{"there is no [["} + name + "]]; add one for each " + what);
   };
   if (const Member* member = document.root.find("supply")) {
     for (const Value* entry : as_entries(*member, findings)) {
@@ -238,19 +253,35 @@ CellPlaces read_cell(const Document& document, Config& config, std::vector<std::
   return places;
 }
 
+std::map<std::string, Diagnostic, std::less<>> places_by_name(const CellPlaces& places, const Findings& findings) {
+  std::map<std::string, Diagnostic, std::less<>> named;
+  const auto add = [&](const std::string& section, const Places& of) {
+    for (const auto& [key, place] : of.values) named.emplace(section + "." + key, findings.at(place));
+  };
+  const auto numbered = [](const char* name, std::size_t i) { return name + ("[" + std::to_string(i) + "]"); };
+  for (const auto& [name, section] : places.sections) add(name, section);
+  for (std::size_t i = 0; i < places.supplies.size(); ++i) add(numbered("supply", i), places.supplies[i]);
+  for (std::size_t i = 0; i < places.parts.size(); ++i) add(numbered("part", i), places.parts[i]);
+  return named;
+}
+
 Expected<Config, std::vector<Diagnostic>> load_document(const std::string& path, Document document,
                                                         const PartSource& parts = {open}) {
   if (!document.usable) return unexpected(std::move(document.findings));
+  if (const Member* mesh = document.root.find("mesh"); mesh != nullptr && document.root.find("supply") == nullptr)
+    return unexpected(std::vector{Findings{document.file, document.lines}.at(
+        mesh->key_place, "this is a part file; give the cell file that names it under [[part]]")});
   Config config;
   config.path = path;
   Findings findings{document.file, document.lines};
   const auto [sections, homes] = names_of_cell();
-  report_strangers(document, sections, homes, findings);
+  const auto misspelt = report_strangers(document, sections, homes, findings);
   std::vector<std::string> part_files;
-  const CellPlaces places = read_cell(document, config, part_files, findings);
+  const CellPlaces places = read_cell(document, config, part_files, misspelt, findings);
   check_rules(config, places, findings);
   const auto of_parts = read_parts(path, part_files, parts, config, places, findings);
 
+  config.stands_at = places_by_name(places, findings);
   auto all = findings.take();
   all.insert(all.end(), document.findings.begin(), document.findings.end());
   // What is said of the file as a whole (line 0) comes last.
@@ -284,7 +315,9 @@ bool operator==(const Supply& a, const Supply& b) {
          a.scan_path == b.scan_path && a.path_timeout == b.path_timeout;
 }
 
-Expected<Config, std::vector<Diagnostic>> load(const std::string& path) { return load_document(path, open(path)); }
+Expected<Config, std::vector<Diagnostic>> load(const std::string& path, MeshFile mesh) {
+  return load_document(path, open(path), {open, mesh});
+}
 Expected<Part, std::vector<Diagnostic>> load_part(const std::string& path) { return load_part_document(open(path)); }
 Expected<Config, std::vector<Diagnostic>> load_text(const std::string& path, std::string_view text) {
   return load_document(path, parse(path, text));
@@ -298,6 +331,14 @@ Expected<Config, std::vector<Diagnostic>> load_texts(const FileText& cell, std::
     return part == parts.end() ? refused(path, "is not among the files that were kept") : parse(path, part->text);
   };
   return load_document(cell.path, parse(cell.path, cell.text), {find, MeshFile::OfNoMatter});
+}
+
+Diagnostic Config::finding(const std::string& key, std::string message) const {
+  Diagnostic finding;
+  if (const auto place = stands_at.find(key); place != stands_at.end()) finding = place->second;
+  finding.file = path;
+  finding.message = std::move(message);
+  return finding;
 }
 
 drivers::scanner::Options Config::scanner_options() const {

@@ -3,6 +3,7 @@
 #include <arpa/inet.h>
 #include <cmath>
 #include <cstdio>
+#include <numbers>
 #include <unordered_map>
 
 #include "base/check.hpp"
@@ -135,6 +136,14 @@ bool read_transform(const Reading& r, Eigen::Isometry3d& out) {
   good = part("xyz_mm", "[x, y, z]", kTranslationMaxMm, xyz_mm) && good;
   good = part("rpy_deg", "[W, P, R], turns about x, then y, then z", 360, rpy_deg) && good;
   if (!good) return false;
+  for (const double angle : rpy_deg)
+    if (const double quarters = angle / (std::numbers::pi / 2);
+        std::abs(quarters) > 0.5 && std::abs(quarters) < 2.5 && std::abs(quarters - std::round(quarters)) < 2e-4) {
+      r.findings.add(r.value.find("rpy_deg")->value.place, r.name + ".rpy_deg: " + number_text(angle) +
+                                                               " looks like radians; write " +
+                                                               number_text(90 * std::round(quarters)));
+      return false;
+    }
   out = Eigen::Isometry3d::Identity();
   out.linear() = from_wpr_deg(rpy_deg);
   out.translation() = xyz_mm;

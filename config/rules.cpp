@@ -1,8 +1,8 @@
 #include "config/rules.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <numbers>
 #include <optional>
 
 #include "config/wording.hpp"
@@ -19,6 +19,15 @@ std::string ms(std::chrono::milliseconds d) { return std::to_string(d.count()); 
 
 std::string port_of(const std::string& endpoint) { return endpoint.substr(endpoint.rfind(':') + 1); }
 
+/// What makes a key right instead, where the choice that it hangs on was left to its default.
+std::string or_choose(const KeyFacts& facts, const CellPlaces& at) {
+  const std::string condition = facts.only_for;
+  const std::size_t dot = condition.find('.'), equals = condition.find(" = ");
+  const std::string section = condition.substr(0, dot), name = condition.substr(dot + 1, equals - dot - 1);
+  if (condition.find(',') != std::string::npos || at.given(section, name) || at.bad(section, name)) return {};
+  return ", or write " + name + " = \"" + condition.substr(equals + 3) + "\" in [" + section + "]";
+}
+
 /// Keys that are for one kind of device only.
 template <class Target>
 void check_only_for(const Section<Target>& section, const std::string& where, const Places& places, Config config,
@@ -29,7 +38,8 @@ void check_only_for(const Section<Target>& section, const std::string& where, co
     const std::string name = std::string{section.name} + "." + key.facts.name;
     if (!is_for_us) continue;
     if (!*is_for_us && places.given(key.facts.name))
-      findings.add(places.of(key.facts.name), name + " is for " + key.facts.only_for + " only; remove it");
+      findings.add(places.of(key.facts.name),
+                   name + " is for " + key.facts.only_for + " only; remove it" + or_choose(key.facts, at));
     if (*is_for_us && key.facts.required && places.is_there && !places.given(key.facts.name) &&
         !places.bad.contains(key.facts.name) && !at.damaged_keys.contains(key.facts.name))
       report_missing(key.facts, name, where, places.header, findings);
@@ -92,7 +102,7 @@ void check_servers(const Config& c, const CellPlaces& at, Findings& findings) {
                      " ms, the PLC would be taken for lost between them; poll more often, or use at least " +
                      ms(2 * c.plc.poll));
   }
-  if (polls && c.plc.address.empty())
+  if (polls && c.plc.address.empty() && !at.bad("plc", "address"))
     findings.add(at.of("plc", "role"),
                  "plc.role is \"client\", but where the PLC's Modbus server is does not stand there; write address = "
                  "\"192.168.0.10:502\" below");
@@ -104,25 +114,71 @@ void check_servers(const Config& c, const CellPlaces& at, Findings& findings) {
         at.of("plc", "address"),
         "plc.address is for the role client, but plc.role is \"server\"; remove it, or write role = \"client\" "
         "and remove listen");
-  const std::string port = polls ? "0" : port_of(c.plc_listen);
-  if (!c.robot_listen.empty() && port != "0" && port == port_of(c.robot_listen))
-    findings.add(at.of("robot", "listen"),
-                 "robot.listen has the same port as plc.listen, " + port + "; use another, such as 5002");
+}
+
+/// An address of the cell: one that it listens on, or that of a device it connects to.
+struct Line {
+  const char *section, *key;
+  const std::string* endpoint;
+  bool listens;
+};
+
+std::string host_of(const std::string& endpoint) { return endpoint.substr(0, endpoint.rfind(':')); }
+
+bool is_any(const std::string& host) { return host.empty() || host == "0.0.0.0" || host == "[::]"; }
+bool is_this_machine(const std::string& host) {
+  return is_any(host) || host == "localhost" || host == "[::1]" || host.starts_with("127.");
+}
+
+/// Two sockets on one port, a device that would be ourselves, or two devices at one address.
+bool clash(const Line& a, const Line& b) {
+  const std::string port = port_of(*a.endpoint), host_a = host_of(*a.endpoint), host_b = host_of(*b.endpoint);
+  if (port == "0" || port != port_of(*b.endpoint)) return false;
+  if (a.listens && b.listens) return true;  // on two addresses of one machine it would confuse whoever reads it
+  if (host_a == host_b) return true;
+  return (a.listens || b.listens) && is_this_machine(host_a) && is_this_machine(host_b) &&
+         (is_any(a.listens ? host_a : host_b));
+}
+
+void check_lines(const Config& c, const CellPlaces& at, Findings& findings) {
+  const bool polls = c.plc.role == plc::LineRole::Client;
+  const bool is_tcp = c.scanner_model == ScannerModel::Lms400;
+  const std::string none;
+  const std::array lines{
+      polls ? Line{"plc", "address", &c.plc.address, false} : Line{"plc", "listen", &c.plc_listen, true},
+      Line{"scanner", "address", is_tcp ? &c.scanner_address : &none, false},
+      Line{"robot", "listen", &c.robot_listen, true},
+      Line{"robot", "pose_address", c.carrier == Carrier::Robot ? &c.pose_address : &none, false},
+      Line{"robot", "pose_listen", c.carrier == Carrier::Robot ? &c.pose_listen : &none, true}};
+  const auto name = [](const Line& line) { return std::string{line.section} + "." + line.key; };
+  for (std::size_t i = 0; i < lines.size(); ++i)
+    for (std::size_t k = 0; k < i; ++k) {
+      const Line &one = lines[i], &other = lines[k];
+      if (one.endpoint->empty() || other.endpoint->empty() || !clash(one, other)) continue;
+      if (one.listens && other.listens)
+        findings.add(at.of(one.section, one.key), name(one) + " has the same port as " + name(other) + ", " +
+                                                      port_of(*one.endpoint) + "; use another, such as " +
+                                                      (std::string_view{one.key} == "listen" ? "5002" : "5003"));
+      else
+        findings.add(at.of(one.section, one.key), name(one) + " = \"" + *one.endpoint + "\" is also where " +
+                                                      name(other) + " is; give each device's own address and port");
+      break;
+    }
 }
 
 /// Who tells where the robot is while it carries the scanner.
 void check_robot_carrier(const Config& c, const CellPlaces& at, Findings& findings) {
   if (c.carrier != Carrier::Robot) return;
-  if (c.robot_listen.empty())
+  if (c.robot_listen.empty() && !at.bad("robot", "listen"))
     findings.add(at.of("robot", "listen"),
                  "robot.listen is empty, but the robot carries the scanner; add, for example: listen = "
                  "\"0.0.0.0:5002\"");
   const bool is_ur = c.robot.dialect == drivers::robot::Dialect::UniversalRobots;
-  if (is_ur && c.pose_address.empty())
+  if (is_ur && c.pose_address.empty() && !at.bad("robot", "pose_address"))
     findings.add(at.of("robot", "pose_address"),
                  "robot.pose_address is missing, but the robot carries the scanner; add, for example: pose_address = "
                  "\"192.168.0.20:30004\"");
-  if (!is_ur && c.pose_listen.empty())
+  if (!is_ur && c.pose_listen.empty() && !at.bad("robot", "pose_listen"))
     findings.add(at.of("robot", "pose_listen"),
                  "robot.pose_listen is missing, but the robot carries the scanner; add, for example: pose_listen = "
                  "\"0.0.0.0:5003\"");
@@ -132,10 +188,6 @@ void check_robot_carrier(const Config& c, const CellPlaces& at, Findings& findin
   if (!is_ur && !c.pose_address.empty())
     findings.add(at.of("robot", "pose_address"),
                  "robot.pose_address is for dialect ur; remove it, others have pose_listen");
-  if (!c.pose_listen.empty() && port_of(c.pose_listen) != "0" &&
-      (port_of(c.pose_listen) == port_of(c.robot_listen) || port_of(c.pose_listen) == port_of(c.plc_listen)))
-    findings.add(at.of("robot", "pose_listen"), "robot.pose_listen has the port of another socket of the cell, " +
-                                                    port_of(c.pose_listen) + "; use another, such as 5003");
   const auto longest = std::min(c.plc.scan_timeout, std::chrono::milliseconds{c.robot.silence_max});
   for (std::size_t i = 0; i < c.supplies.size(); ++i)
     if (c.supplies[i].path_timeout >= longest)
@@ -175,65 +227,6 @@ void check_sweeps(const Config& c, const CellPlaces& at, Findings& findings) {
   }
 }
 
-/// In the middle of a sweep the scanner's middle ray goes down into the supply, or at most half its size beside it.
-/// What looks elsewhere is metres for millimetres, radians for degrees, or a mount with a wrong sign.
-void check_views(const Config& c, const CellPlaces& at, Findings& findings) {
-  const bool mounted =
-      c.carrier == Carrier::Pivot && at.given("pivot", "T_base_pivot") && at.given("scanner", "T_pivot_scanner");
-  for (std::size_t i = 0; mounted && i < c.supplies.size(); ++i) {
-    const Supply& supply = c.supplies[i];
-    const Places& places = at.supplies[i];
-    const auto given = [&](const char* key) { return places.given(key); };
-    if (!given("T_base_supply") || !given("size_mm") || !given("sweep_start_deg") || !given("sweep_end_deg")) continue;
-    const double pivot_rad = (supply.sweep_start.in_rad() + supply.sweep_end.in_rad()) / 2;
-    const double ray_rad = c.scanner_model == ScannerModel::Lms400
-                               ? c.lms400.start.in_rad() + c.lms400.range.in_rad() / 2
-                               : std::numbers::pi / 2;
-    const Eigen::Isometry3d T_supply_scanner = supply.T_base_supply.iso.inverse() * c.mount.T_base_pivot.iso *
-                                               Eigen::AngleAxisd(pivot_rad, Eigen::Vector3d::UnitZ()) *
-                                               c.mount.T_pivot_scanner.iso;
-    const Eigen::Vector3d from = T_supply_scanner.translation();
-    const Eigen::Vector3d ray = T_supply_scanner.linear() * Eigen::Vector3d{std::cos(ray_rad), 0, std::sin(ray_rad)};
-    std::string where;
-    if (from.z() < supply.size_mm.z()) {
-      where = "the scanner stands at z = " + rounded(std::round(from.z()) + 0.0) + " mm, below the walls' tops";
-    } else if (ray.z() > -0.1) {
-      where = "it never looks down into it";
-    } else {
-      const Eigen::Vector3d hit = from - ray * (from.z() / ray.z());
-      if (std::abs(hit.x()) <= supply.size_mm.x() && std::abs(hit.y()) <= supply.size_mm.y()) continue;
-      where = "it meets the floor at x = " + rounded(std::round(hit.x()) + 0.0) +
-              ", y = " + rounded(std::round(hit.y()) + 0.0) + " mm from its middle";
-    }
-    findings.add(
-        places.of("T_base_supply"),
-        "in the middle of the sweep the scanner does not look into the supply: " + where +
-            "; correct T_base_pivot, T_pivot_scanner, T_base_supply (mm, degrees, signs) or the sweep's angles");
-  }
-}
-
-void check_reach(const Config& c, const CellPlaces& at, Findings& findings) {
-  if (c.reach.radius_max_mm > 0 && c.reach.axis_min_mm >= c.reach.radius_max_mm)
-    findings.add(at.of("reach", at.given("reach", "radius_max_mm") ? "radius_max_mm" : "axis_min_mm"),
-                 "reach.radius_max_mm = " + rounded(c.reach.radius_max_mm) +
-                     " leaves nothing outside of reach.axis_min_mm = " + rounded(c.reach.axis_min_mm) +
-                     "; use more, or 0 for no limit");
-}
-
-void check_sizes(const Config& c, const CellPlaces& at, Findings& findings) {
-  for (std::size_t i = 0; i < c.supplies.size(); ++i) {
-    const Eigen::Vector3d& size = c.supplies[i].size_mm;
-    if (!at.supplies[i].given("size_mm")) continue;
-    if (size.head<2>().minCoeff() < 10)
-      findings.add(at.supplies[i].of("size_mm"), "supply.size_mm is less than 10 mm along x or y; give mm");
-    if (c.supplies[i].locate && size.z() < 20)
-      findings.add(
-          at.supplies[i].of("locate"),
-          "supply.locate looks for a rim, and supply.size_mm gives no walls of 20 mm or more; give their height, "
-          "or leave locate out");
-  }
-}
-
 template <class Entry>
 void check_ids(const std::vector<Entry>& entries, const std::vector<Places>& places, const std::string& section,
                Findings& findings) {
@@ -270,11 +263,10 @@ void check_rules(const Config& config, const CellPlaces& places, Findings& findi
     check_only_for(supply_section(), "[[supply]]", supply, config, places, findings);
   check_devices(config, places, findings);
   check_servers(config, places, findings);
+  check_lines(config, places, findings);
   check_robot_carrier(config, places, findings);
   check_sweeps(config, places, findings);
-  check_views(config, places, findings);
-  check_reach(config, places, findings);
-  check_sizes(config, places, findings);
+  check_geometry(config, places, findings);
   check_ids(config.supplies, places.supplies, "supply", findings);
   check_ids(config.recipes, places.parts, "part", findings);
 }

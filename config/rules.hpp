@@ -17,6 +17,7 @@ struct CellPlaces {
   std::set<std::string> damaged_keys;  ///< In lines that could not be read: not missing.
 
   const Place& of(const std::string& section, const std::string& key) const { return sections.at(section).of(key); }
+  bool bad(const std::string& section, const std::string& key) const { return sections.at(section).bad.contains(key); }
   /// False where a key was given but bad, or its section is: then a rule about it would only echo that.
   bool given(const std::string& section, const std::string& key) const { return sections.at(section).given(key); }
 };
@@ -25,6 +26,9 @@ struct CellPlaces {
 std::optional<bool> is_for(const KeyFacts& facts, Config config, const CellPlaces& at);
 /// Values that were bad hold their default while this runs, so that one mistake is not told twice.
 void check_rules(const Config& config, const CellPlaces& places, Findings& findings);
+
+/// Those of where things stand: mounts, supplies, reach. Called by check_rules().
+void check_geometry(const Config& config, const CellPlaces& places, Findings& findings);
 
 /// Where [gripper], [[gripper_body]] and [[grasp]] of a part file stand, in the order of the part's own.
 struct GripPlaces {

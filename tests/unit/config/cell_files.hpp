@@ -97,4 +97,29 @@ class CellFolder {
 
   std::string folder_;
 };
+
+/// The example cell with a Leuze scanner over a small box in the place of the SICK over a lattice box.
+inline void make_leuze(CellFolder& folder, const std::string& model) {
+  const std::size_t from = folder.cell.find("frequency_hz = 360"), to = folder.cell.find("profile_timeout_ms");
+  folder.cell.erase(from, to - from);
+  folder.edit("model = \"lms400\"", "model = \"" + model + "\"");
+  folder.edit("address = \"192.168.0.1:2111\"", "address = \"192.168.60.3:9008\"");
+  folder.edit("xyz_mm = [1200, 0, 1860]", "xyz_mm = [1200, 0, 560]");
+  folder.edit("size_mm = [1000, 800, 500]", "size_mm = [300, 300, 120]");
+}
+
+/// The example cell with its scanner on the robot.
+inline void put_on_robot(CellFolder& folder, const std::string& dialect) {
+  const std::size_t from = folder.cell.find("[pivot]"), to = folder.cell.find("[scanner]");
+  folder.cell.erase(from, to - from);
+  folder.edit("[scanner]\n",
+              "[scanner]\ncarrier = \"robot\"\nT_flange_scanner = { xyz_mm = [0, 80, 120], rpy_deg = [0, 0, 0] }\n");
+  folder.edit("\ncarrier = \"pivot\"", "\n");
+  folder.edit("T_pivot_scanner = { xyz_mm = [60, 0, 0], rpy_deg = [180, -90, 0] }", "");
+  folder.edit("dialect = \"ur\"",
+              "dialect = \"" + dialect + "\"\n" +
+                  (dialect == "ur" ? "pose_address = \"192.168.0.20:30004\"" : "pose_listen = \"0.0.0.0:5003\""));
+  for (const char* key : {"sweep_start_deg = -16", "sweep_end_deg = 16", "sweep_speed_deg_s = 34"})
+    folder.edit(key, "");
+}
 }  // namespace binpick::config

@@ -56,14 +56,6 @@ TEST(Load, RotationsAreAboutFixedAxesXThenYThenZ) {
   EXPECT_EQ(T.translation(), Eigen::Vector3d(1201, 2, 1863));
 }
 
-/// The example cell with a Leuze scanner in the place of the SICK.
-void make_leuze(CellFolder& folder, const std::string& model) {
-  const std::size_t from = folder.cell.find("frequency_hz = 360"), to = folder.cell.find("profile_timeout_ms");
-  folder.cell.erase(from, to - from);
-  folder.edit("model = \"lms400\"", "model = \"" + model + "\"");
-  folder.edit("address = \"192.168.0.1:2111\"", "address = \"192.168.60.3:9008\"");
-}
-
 TEST(Load, ALeuzeScannerHasKeysOfItsOwn) {
   for (const bool hi : {false, true}) {
     CellFolder folder;
@@ -79,21 +71,6 @@ TEST(Load, ALeuzeScannerHasKeysOfItsOwn) {
     EXPECT_EQ(options.manual_exposure, std::chrono::microseconds(200));
     EXPECT_EQ(loaded->scanner_listen_port, 5634);
   }
-}
-
-/// The example cell with its scanner on the robot.
-void put_on_robot(CellFolder& folder, const std::string& dialect) {
-  const std::size_t from = folder.cell.find("[pivot]"), to = folder.cell.find("[scanner]");
-  folder.cell.erase(from, to - from);
-  folder.edit("[scanner]\n",
-              "[scanner]\ncarrier = \"robot\"\nT_flange_scanner = { xyz_mm = [0, 80, 120], rpy_deg = [0, 0, 0] }\n");
-  folder.edit("\ncarrier = \"pivot\"", "\n");
-  folder.edit("T_pivot_scanner = { xyz_mm = [60, 0, 0], rpy_deg = [180, -90, 0] }", "");
-  folder.edit("dialect = \"ur\"",
-              "dialect = \"" + dialect + "\"\n" +
-                  (dialect == "ur" ? "pose_address = \"192.168.0.20:30004\"" : "pose_listen = \"0.0.0.0:5003\""));
-  for (const char* key : {"sweep_start_deg = -16", "sweep_end_deg = 16", "sweep_speed_deg_s = 34"})
-    folder.edit(key, "");
 }
 
 TEST(Load, TheRobotMayCarryTheScanner) {
@@ -160,7 +137,7 @@ TEST(Load, AbsentKeysHaveTheTablesDefaults) {
   CellFolder folder;
   folder.cell = R"([pivot]
 can = "cannelloni://10.0.0.2:20000"
-T_base_pivot = { xyz_mm = [0, 0, 500], rpy_deg = [0, 90, 0] }
+T_base_pivot = { xyz_mm = [0, 0, 1500], rpy_deg = [0, 90, 0] }
 [scanner]
 model = "lms400"
 address = "[fd00::1]:2111"
@@ -301,17 +278,103 @@ TEST(Load, AScannerThatLooksPastTheSupplyIsAMistake) {
   struct Wrong {
     std::string from, to, why;
   };
-  for (const Wrong& wrong : {Wrong{supply, "T_base_supply = { xyz_mm = [1.2, 0, 0], rpy_deg = [0, 0, 0] }",
-                                   "it meets the floor at x = 1199, y = 0 mm"},
-                             Wrong{pivot, "T_base_pivot = { xyz_mm = [1200, 0, 1860], rpy_deg = [0, 1.5708, 0] }",
-                                   "it never looks down into it"},
-                             Wrong{pivot, "T_base_pivot = { xyz_mm = [1.2, 0, 1.86], rpy_deg = [0, 90, 0] }",
-                                   "the scanner stands at z = -58 mm, below the walls' tops"}}) {
+  for (const Wrong& wrong :
+       {Wrong{supply, "T_base_supply = { xyz_mm = [1.2, 0, 0], rpy_deg = [0, 0, 0] }",
+              "it meets the floor at x = 1199, y = 0 mm"},
+        Wrong{pivot, "T_base_pivot = { xyz_mm = [1200, 0, 1860], rpy_deg = [0, 2, 0] }", "it never looks down into it"},
+        Wrong{pivot, "T_base_pivot = { xyz_mm = [1.2, 0, 1.86], rpy_deg = [0, 90, 0] }",
+              "the scanner stands at z = -58 mm, below the walls' tops"}}) {
     CellFolder folder;
     folder.edit(wrong.from, wrong.to);
     EXPECT_FALSE(folder.load().has_value());
     EXPECT_NE(folder.findings().find(head + wrong.why), std::string::npos) << folder.findings();
   }
+}
+
+TEST(Load, AScannerOutOfItsRangeIsAMistake) {
+  CellFolder folder;
+  folder.edit("xyz_mm = [1200, 0, 1860]", "xyz_mm = [1200, 0, 3160]");
+  EXPECT_NE(folder.findings().find("the scanner is 3100 mm from the supply's floor and 2850 mm from half its walls' "
+                                   "height, but an LMS 400 measures from 700 to 3000 mm; mount it nearer"),
+            std::string::npos)
+      << folder.findings();
+  const auto leuze = [](const std::string& model, const std::string& height_mm) {
+    CellFolder small;
+    make_leuze(small, model);
+    small.edit("xyz_mm = [1200, 0, 560]", "xyz_mm = [1200, 0, " + height_mm + "]");
+    return small.findings();
+  };
+  EXPECT_EQ(leuze("lps36", "860"), "");
+  EXPECT_NE(leuze("lps36", "310").find("but an LPS 36 measures from 200 to 800 mm; mount it farther away"),
+            std::string::npos);
+  EXPECT_NE(leuze("lps36hi", "760").find("but an LPS 36 HI measures from 200 to 600 mm; mount it nearer"),
+            std::string::npos);
+}
+
+TEST(Load, RadiansForDegreesAreAMistakeInAnyTransform) {
+  const auto said = [](const std::string& rpy) {
+    CellFolder folder;
+    folder.edit("T_base_supply = { xyz_mm = [1200, 0, 0], rpy_deg = [0, 0, 0] }",
+                "T_base_supply = { xyz_mm = [1200, 0, 0], rpy_deg = " + rpy + " }");
+    return folder.findings();
+  };
+  EXPECT_NE(said("[0, 0, 3.14159]").find("supply.T_base_supply.rpy_deg: 3.14159 looks like radians; write 180\n"),
+            std::string::npos);
+  EXPECT_NE(said("[0, 0, -1.5708]").find("supply.T_base_supply.rpy_deg: -1.5708 looks like radians; write -90\n"),
+            std::string::npos);
+  for (const char* degrees : {"[0, 0, 1.57]", "[0, 0, 3.1]", "[0, 0, 180]", "[0, 0, 0.0001]"})
+    EXPECT_EQ(said(degrees), "") << degrees;
+}
+
+TEST(Load, WhereTheRobotCarriesTheScannerMetresAreAMistakeToo) {
+  const auto said = [](const std::string& from, const std::string& to) {
+    CellFolder folder;
+    put_on_robot(folder, "ur");
+    folder.edit(from, to);
+    return folder.findings();
+  };
+  const std::string supply = "T_base_supply = { xyz_mm = [1200, 0, 0]";
+  EXPECT_NE(
+      said(supply, "T_base_supply = { xyz_mm = [1.2, 0, 0]")
+          .find("supply.T_base_supply puts the robot's base into the supply, 1.2 mm from the middle of its floor; "
+                "give xyz_mm in mm\n"),
+      std::string::npos);
+  EXPECT_EQ(said(supply, "T_base_supply = { xyz_mm = [0, 0, -1500]"), "") << "a robot above the supply";
+  EXPECT_NE(
+      said("T_flange_scanner = { xyz_mm = [0, 80, 120]", "T_flange_scanner = { xyz_mm = [0, 0.08, 0.12]")
+          .find("scanner.T_flange_scanner puts the scanner 0.144 mm from the flange's middle; give xyz_mm in mm\n"),
+      std::string::npos);
+}
+
+TEST(Load, ASupplyThatNobodyReachesIsAMistake) {
+  CellFolder folder;
+  folder.edit("radius_max_mm = 0", "radius_max_mm = 690");
+  EXPECT_NE(folder.findings().find("no place of the supply is nearer than 700 mm to the robot's base, beyond "
+                                   "reach.radius_max_mm = 690; correct T_base_supply (mm), or the reach\n"),
+            std::string::npos)
+      << folder.findings();
+  folder.edit("radius_max_mm = 690", "radius_max_mm = 710");
+  EXPECT_EQ(folder.findings(), "");
+}
+
+TEST(Load, TwoSocketsOnOnePortAndADeviceThatIsTheCellItselfAreMistakes) {
+  const auto said = [](const std::string& from, const std::string& to) {
+    CellFolder folder;
+    put_on_robot(folder, "ur");
+    folder.edit(from, to);
+    return folder.findings();
+  };
+  const std::string address = "pose_address = \"192.168.0.20:30004\"";
+  EXPECT_NE(said(address, "pose_address = \"127.0.0.1:5002\"")
+                .find("robot.pose_address = \"127.0.0.1:5002\" is also where robot.listen is; give each device's own "
+                      "address and port\n"),
+            std::string::npos);
+  EXPECT_NE(said(address, "pose_address = \"192.168.0.1:2111\"").find("is also where scanner.address is"),
+            std::string::npos);
+  EXPECT_EQ(said(address, "pose_address = \"192.168.0.20:5002\""), "") << "on another machine";
+  EXPECT_NE(said("dialect = \"ur\"\n" + address, "dialect = \"fanuc\"\npose_listen = \"0.0.0.0:502\"")
+                .find("robot.pose_listen has the same port as plc.listen, 502; use another, such as 5003\n"),
+            std::string::npos);
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -371,14 +434,63 @@ TEST(Load, ARadiusWithinTheOneToKeepOutOfIsRefused) {
                                    "use more, or 0 for no limit\n");
 }
 
-TEST(Load, EntriesThatAreMissingAreSaidAtTheEndOfTheFile) {
+TEST(Load, WhatIsMissingIsSaidOfTheWholeFile) {
   CellFolder folder;
   folder.cell = "[cell]\nname = \"empty\"\n";
   EXPECT_EQ(folder.findings(),
-            "2:1: section [pivot] is missing; add it, with can, T_base_pivot\n"
-            "2:1: section [scanner] is missing; add it, with model, address, T_pivot_scanner\n"
-            "2:1: there is no [[supply]]; add one for each charge carrier\n"
-            "2:1: there is no [[part]]; add one for each part that the PLC can ask for\n");
+            "0:1: section [pivot] is missing; add it, with can, T_base_pivot\n"
+            "0:1: section [scanner] is missing; add it, with model, address, T_pivot_scanner\n"
+            "0:1: there is no [[supply]]; add one for each charge carrier\n"
+            "0:1: there is no [[part]]; add one for each part that the PLC can ask for\n");
+}
+
+TEST(Load, ASectionWithASlipIsNotMissingToo) {
+  for (const auto& [name, slip] : {std::pair{"[scanner]", "[scaner]"}, {"[[supply]]", "[[suply]]"}}) {
+    CellFolder folder;
+    folder.edit(name, slip);
+    const std::string findings = folder.findings();
+    EXPECT_NE(findings.find("unknown section"), std::string::npos) << findings;
+    EXPECT_EQ(findings.find("is missing"), std::string::npos) << findings;
+    EXPECT_EQ(findings.find("there is no"), std::string::npos) << findings;
+  }
+}
+
+TEST(Load, AForgottenCarrierIsSaidWhereItBelongs) {
+  CellFolder folder;
+  put_on_robot(folder, "ur");
+  folder.edit("carrier = \"robot\"\n", "");
+  const std::string findings = folder.findings();
+  EXPECT_NE(
+      findings.find(std::to_string(folder.line_of("[scanner]")) +
+                    ":1: section [pivot] is missing; add it, with can, T_base_pivot; or, if the robot carries the "
+                    "scanner, write carrier = \"robot\" in [scanner]\n"),
+      std::string::npos)
+      << findings;
+  EXPECT_NE(findings.find("scanner.T_flange_scanner is for scanner.carrier = robot only; remove it, or write carrier = "
+                          "\"robot\" in [scanner]\n"),
+            std::string::npos)
+      << findings;
+}
+
+TEST(Load, AnAddressThatIsBadIsNotMissingToo) {
+  CellFolder folder;
+  put_on_robot(folder, "ur");
+  folder.edit("pose_address = \"192.168.0.20:30004\"", "pose_address = \"192.168.0.20\"");
+  EXPECT_EQ(folder.findings(), std::to_string(folder.line_of("pose_address")) +
+                                   ":16: robot.pose_address = \"192.168.0.20\" has no port; write it as host:port\n");
+}
+
+TEST(Load, APartFileIsNoCellFileNorTheOtherWayRound) {
+  CellFolder folder;
+  ASSERT_EQ(folder.findings(), "");
+  const auto cell = load(folder.path("track_link.toml"));
+  ASSERT_FALSE(cell.has_value());
+  ASSERT_EQ(cell.error().size(), 1U);
+  EXPECT_EQ(cell.error()[0].message, "this is a part file; give the cell file that names it under [[part]]");
+  const auto part = load_part(folder.path("cell.toml"));
+  ASSERT_FALSE(part.has_value());
+  ASSERT_EQ(part.error().size(), 1U);
+  EXPECT_EQ(part.error()[0].message, "this is a cell file; give one of the part files that it names under [[part]]");
 }
 
 TEST(Load, IdsAreUnique) {
