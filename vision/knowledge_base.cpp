@@ -93,6 +93,7 @@ std::uint64_t KnowledgeBase::checksum() const {
 const std::string& KnowledgeBase::part_name() const { return impl_->part_name; }
 const Mesh& KnowledgeBase::mesh() const { return impl_->mesh; }
 const Symmetry& KnowledgeBase::symmetry() const { return impl_->symmetry; }
+std::uint64_t KnowledgeBase::mesh_hash() const { return impl_->mesh_hash; }
 ScannerClass KnowledgeBase::scanner() const { return impl_->scanner; }
 double KnowledgeBase::pixel_mm() const { return impl_->pixel_mm; }
 double KnowledgeBase::noise_mm() const { return impl_->noise_mm; }

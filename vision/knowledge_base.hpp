@@ -77,6 +77,8 @@ class KnowledgeBase {
 
   /// Of the whole file: the same for the same training, whatever its name.
   std::uint64_t checksum() const;
+  /// Of the mesh it was trained from, as mesh_hash() has it.
+  std::uint64_t mesh_hash() const;
   const std::string& part_name() const;
   const Mesh& mesh() const;
   const Symmetry& symmetry() const;
@@ -95,6 +97,10 @@ class KnowledgeBase {
 
 /// The symmetry that the options give, completed, or the one found from the mesh.
 Symmetry symmetry_of(const Mesh& mesh, const PartOptions& options);
+
+/// The first of the part's options that was another one when the knowledge base was trained ("pixel_mm"); empty: none of
+/// those that it tells of. What has its default now is compared where that does not take the training itself.
+std::string other_option(const KnowledgeBase& trained, const PartOptions& options);
 
 /// Renders the mesh in every training rotation and stores votes (docs/vision.md, training).
 /// Deterministic for the same mesh and options. `progress` may be empty.

@@ -22,7 +22,7 @@ namespace {
 constexpr double kSmallPartMm = 150;  ///< Below, a part belongs to the triangulation scanners.
 constexpr double kLargestPartMm = 5000;
 constexpr double kSpacingsMin = 6;
-constexpr int kRotationsMax = 60'000;
+constexpr int kRotationsMax = 60'000, kRotations = 10'000;
 constexpr int kLooks = 4;
 constexpr std::size_t kVotesPerView = 256;
 
@@ -74,7 +74,20 @@ PartFacts resolved(const Mesh& mesh, const PartOptions& options) {
 /// as densely as those of 10 000 rotations.
 double gap_rad(int rotations, const Symmetry& symmetry) {
   const bool finite = symmetry.kind == Symmetry::Kind::None || symmetry.kind == Symmetry::Kind::Finite;
-  return 122 * std::numbers::pi / 180 / std::cbrt(finite ? rotations : 10'000);
+  return 122 * std::numbers::pi / 180 / std::cbrt(finite ? rotations : kRotations);
+}
+
+int rotations_of(const PartOptions& options) {
+  return std::clamp(options.rotations.value_or(kRotations), 1, kRotationsMax);
+}
+
+/// The same group about the same centre, written down in the same way.
+bool same(const Symmetry& a, const Symmetry& b) {
+  constexpr double kSame = 1e-6;
+  if (a.kind != b.kind || a.rotations.size() != b.rotations.size()) return false;
+  if ((a.centre_mm - b.centre_mm).norm() > kSame || (a.axis - b.axis).norm() > kSame) return false;
+  return std::equal(a.rotations.begin(), a.rotations.end(), b.rotations.begin(),
+                    [](const Eigen::Matrix3d& x, const Eigen::Matrix3d& y) { return (x - y).norm() < kSame; });
 }
 
 struct Conveyor {
@@ -175,6 +188,18 @@ Symmetry symmetry_of(const Mesh& mesh, const PartOptions& options) {
   return find_symmetry(mesh, options.symmetry_tolerance_mm.value_or(std::max(0.5 * noise_mm, 0.005 * diameter_mm)));
 }
 
+std::string other_option(const KnowledgeBase& trained, const PartOptions& options) {
+  const PartFacts& part = trained.impl();
+  if (part.scanner != scanner_of(options, part.diameter_mm)) return "scanner";
+  if (options.pixel_mm && *options.pixel_mm != part.pixel_mm) return "pixel_mm";
+  if (options.symmetry && !same(symmetry_of(part.mesh, options), part.symmetry)) return "symmetry";
+  // Views of a part on a conveyor are never as far apart as those of a bin.
+  const double bin_gap_rad = gap_rad(rotations_of(options), part.symmetry);
+  const bool as_in_a_bin = std::abs(part.rotation_gap_rad - bin_gap_rad) < 1e-9;
+  if (options.picking == Picking::Conveyor) return as_in_a_bin ? "picking" : "";
+  return as_in_a_bin ? "" : "rotations or picking";
+}
+
 Expected<KnowledgeBase, MeshError> train(const Mesh& mesh, const PartOptions& options,
                                          const std::function<void(TrainingProgress)>& progress,
                                          TrainingSummary* summary, int threads) {
@@ -207,7 +232,7 @@ Expected<KnowledgeBase, MeshError> train(const Mesh& mesh, const PartOptions& op
   if (part.diameter_mm < 4 * part.pixel_mm)
     return failed("the part's diameter is " + mm(part.diameter_mm) + ", too small for pixels of " + mm(part.pixel_mm) +
                   "; check mesh_unit, pixel_mm and scanner");
-  const int asked = std::clamp(options.rotations.value_or(10'000), 1, kRotationsMax);
+  const int asked = rotations_of(options);
   std::vector<Eigen::Quaterniond> rotations = training_rotations(asked, part.symmetry);
   part.rotation_gap_rad = gap_rad(asked, part.symmetry);
   std::size_t resting = 0;
