@@ -25,7 +25,7 @@ std::string what_it_holds(const std::vector<std::uint16_t>& words) {
 }
 }  // namespace
 
-PlcAnswer ask_plc(link::Loop& loop, const config::Config& config) {
+Answer ask_plc(link::Loop& loop, const config::Config& config) {
   const auto endpoint = link::parse_endpoint(config.plc.address);
   if (!endpoint) return {false, endpoint.error()};
   const modbus::Request request{.transaction = 1,
@@ -35,17 +35,17 @@ PlcAnswer ask_plc(link::Loop& loop, const config::Config& config) {
                                 .words = {}};
   modbus::FrameBuffer buffer;
   Bytes output;
-  std::optional<PlcAnswer> answer;
+  std::optional<Answer> answer;
   bool connected = false;
   const auto on_bytes = [&](ByteView bytes, TimePoint) {
     buffer.append(bytes);
     const auto frame = buffer.take_frame();
     if (!frame) {
-      answer = PlcAnswer{false, "no Modbus comes from there: " + to_string(frame.error())};
+      answer = Answer{false, "no Modbus comes from there: " + to_string(frame.error())};
     } else if (*frame) {
       const auto words = modbus::parse_reply(**frame, request);
-      answer = words ? PlcAnswer{true, "unit " + std::to_string(request.unit) + " answers, " + what_it_holds(*words)}
-                     : PlcAnswer{false, to_string(request) + ": " + to_string(words.error())};
+      answer = words ? Answer{true, "unit " + std::to_string(request.unit) + " answers, " + what_it_holds(*words)}
+                     : Answer{false, to_string(request) + ": " + to_string(words.error())};
     }
   };
   link::TcpClient client{loop,
@@ -59,7 +59,7 @@ PlcAnswer ask_plc(link::Loop& loop, const config::Config& config) {
                           .on_disconnected =
                               [&](TimePoint) {
                                 if (!answer)
-                                  answer = PlcAnswer{false, "it closed the connection; is it taken by another client?"};
+                                  answer = Answer{false, "it closed the connection; is it taken by another client?"};
                               },
                           .take_output = [&] { return std::exchange(output, {}); }}};
   const SystemClock clock;

@@ -3,14 +3,17 @@
 #include <chrono>
 #include <cstdio>
 #include <optional>
+#include <stdexcept>
 #include <string>
 
 #include "base/clock.hpp"
 #include "base/overloaded.hpp"
+#include "base/peer_address.hpp"
 #include "config/config.hpp"
 #include "tools/commands.hpp"
 #include "tools/device_links.hpp"
 #include "tools/plc_probe.hpp"
+#include "tools/pose_probe.hpp"
 
 /// binpick probe CELL.toml: reaches each configured device and says what it is, without moving anything.
 namespace binpick::tools {
@@ -19,28 +22,35 @@ constexpr Duration kAnswerMax = std::chrono::seconds(4);
 constexpr Duration kSpinUpMax = std::chrono::seconds(15);  // the scanner, once it has answered at all
 constexpr Duration kRobotMax = std::chrono::seconds(3);
 
-/// Waits a while for the robot's program to connect. Its address, or nothing.
-std::optional<std::string> robot_address(drivers::link::Loop& loop, const std::string& listen) {
-  const auto endpoint = drivers::link::parse_endpoint(listen);
-  if (!endpoint) return std::nullopt;
+/// Waits a while for the robot's program to connect.
+Answer ask_robot(drivers::link::Loop& loop, const config::Config& config) {
+  const auto endpoint = drivers::link::parse_endpoint(config.robot_listen);
+  if (!endpoint) return {false, endpoint.error()};
   std::optional<std::string> robot;
-  drivers::link::TcpServer server{
-      loop,
-      *endpoint,
-      {.on_accept =
-           [&](drivers::link::ConnectionId, const std::string& address, std::uint16_t, TimePoint) {
-             robot = address;
-             return false;  // its program tries again, with the daemon
-           },
-       .on_bytes = [](drivers::link::ConnectionId, ByteView, TimePoint) {},
-       .on_closed = [](drivers::link::ConnectionId, TimePoint) {},
-       .take_output = [](drivers::link::ConnectionId) { return Bytes{}; },
-       .wants_close = {}}};
+  std::optional<drivers::link::TcpServer> server;
+  try {
+    server.emplace(loop, *endpoint,
+                   drivers::link::ServerPeer{
+                       .on_accept =
+                           [&](drivers::link::ConnectionId, const std::string& address, std::uint16_t, TimePoint) {
+                             robot = address;
+                             return false;  // its program tries again, with the daemon
+                           },
+                       .on_bytes = [](drivers::link::ConnectionId, ByteView, TimePoint) {},
+                       .on_closed = [](drivers::link::ConnectionId, TimePoint) {},
+                       .take_output = [](drivers::link::ConnectionId) { return Bytes{}; },
+                       .wants_close = {}});
+  } catch (const std::runtime_error& failure) {
+    return {false, failure.what()};
+  }
   const SystemClock clock;
   TimePoint now = clock.now();
   const TimePoint until = now + kRobotMax;
   while (!robot && now < until) now = loop.wait(until);
-  return robot;
+  if (!robot) return {false, "no robot connects; start its program"};
+  if (!may_connect(config.robot_allow, *robot))
+    return {false, *robot + " connects, but is not in robot.allow; add it there"};
+  return {true, "connects from " + *robot};
 }
 
 std::string pivot_text(const drivers::pivot::Options& options, const drivers::pivot::ModuleInfo& module) {
@@ -113,19 +123,22 @@ int probe(const std::string& cell_path) {
   else
     std::printf("pivot    none: the robot carries the scanner\n");
   std::printf("scanner  %s: %s\n", config->scanner_address.c_str(), scanner.c_str());
-  bool robot_good = true;
+  Answer robot{true, ""}, poses{true, ""};
   if (config->robot_listen.empty()) {
     std::printf("robot    none configured: the PLC forwards the movement\n");
   } else {
-    const auto robot = robot_address(devices.loop(), config->robot_listen);
-    robot_good = robot.has_value();
-    std::printf("robot    %s: %s\n", config->robot_listen.c_str(),
-                robot ? ("connects from " + *robot).c_str() : "no robot connects; start its program");
+    robot = ask_robot(devices.loop(), *config);
+    std::printf("robot    %s: %s\n", config->robot_listen.c_str(), robot.text.c_str());
   }
-  PlcAnswer plc{true, "free; the PLC is the client and connects when the daemon runs"};
+  if (!has_pivot) {
+    poses = ask_poses(devices.loop(), *config);
+    std::printf("poses    %s: %s\n", (config->pose_listen.empty() ? config->pose_address : config->pose_listen).c_str(),
+                poses.text.c_str());
+  }
+  Answer plc{true, "free; the PLC is the client and connects when the daemon runs"};
   if (config->plc.role == plc::LineRole::Client) plc = ask_plc(devices.loop(), *config);
   std::printf("plc      %s: %s\n", config->plc_line().c_str(), plc.text.c_str());
-  return pivot_good && scanner_good && robot_good && plc.good ? 0 : 1;
+  return pivot_good && scanner_good && robot.good && poses.good && plc.good ? 0 : 1;
 }
 }  // namespace
 

@@ -50,6 +50,10 @@ class PoseSource {
   std::optional<Duration> uncertainty() const {
     return std::visit([](const auto& s) { return s.uncertainty(); }, session_);
   }
+  /// "controller software 5.11.0"; empty: the make does not tell, or not yet.
+  std::string controller() const {
+    return std::visit([](const auto& s) { return s.controller(); }, session_);
+  }
   /// Why the arm cannot move, as the controller says; empty: it can, or the make does not tell.
   std::string trouble() const {
     return std::visit([](const auto& s) { return s.trouble(); }, session_);

@@ -182,6 +182,7 @@ std::optional<PoseEvent> PoseStream::take_event() { return impl_->intake.take_ev
 bool PoseStream::take_reopen() { return std::exchange(impl_->reopen, false); }
 PoseState PoseStream::state() const { return impl_->intake.state(); }
 std::optional<Duration> PoseStream::uncertainty() const { return impl_->intake.clock().uncertainty(); }
+std::string PoseStream::controller() const { return {}; }
 std::string PoseStream::trouble() const { return {}; }
 std::uint64_t PoseStream::lines_lost() const { return impl_->lost; }
 std::uint64_t PoseStream::bad_lines() const { return impl_->bad; }

@@ -57,6 +57,7 @@ class PoseStream {
   PoseState state() const;
 
   std::optional<Duration> uncertainty() const;
+  std::string controller() const;    ///< Never anything.
   std::string trouble() const;       ///< Never anything: lines do not tell it.
   std::uint64_t lines_lost() const;  ///< By gaps in the sequence, since the start.
   std::uint64_t bad_lines() const;   ///< Not understood, since the start.

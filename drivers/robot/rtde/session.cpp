@@ -290,5 +290,8 @@ std::optional<robot::PoseEvent> Session::take_event() { return impl_->intake.tak
 bool Session::take_reopen() { return std::exchange(impl_->reopen, false); }
 robot::PoseState Session::state() const { return impl_->intake.state(); }
 std::optional<Duration> Session::uncertainty() const { return impl_->intake.clock().uncertainty(); }
+std::string Session::controller() const {
+  return impl_->version.major == 0 ? "" : "controller software " + impl_->version_text();
+}
 std::string Session::trouble() const { return impl_->trouble; }
 }  // namespace binpick::drivers::rtde

@@ -39,6 +39,7 @@ class Session {
   robot::PoseState state() const;
 
   std::optional<Duration> uncertainty() const;  ///< Of the samples' times; nullopt: not known yet.
+  std::string controller() const;               ///< "controller software 5.11.0"; empty: not known yet.
   /// Why the arm cannot move, as the controller says ("protective stop"); empty: it can, or nothing is known. While it
   /// has no power there are no samples.
   std::string trouble() const;
