@@ -16,8 +16,6 @@ plc::Unreachable as_plc_reads(vision::Obstacle obstacle) {
   static_assert(static_cast<int>(plc::Unreachable::Unmeasured) == static_cast<int>(Obstacle::Unmeasured));
   return static_cast<plc::Unreachable>(obstacle);
 }
-/// Of the supply: a scan that saw less and has found nothing tells little of it.
-constexpr double kMeasuredMin = 0.3;
 /// To the start of a sweep the pivot drives with this share of what the module can do.
 constexpr double kPositioningShare = 0.4;
 /// The alarm for lines that were not understood goes when there was none for so long.
@@ -267,6 +265,10 @@ void Cell::publish(TimePoint now) {
   if (new_scan) memory_.keep(place(), *std::exchange(detect_result_, std::nullopt), last_profile_at_);
   const DetectResult& scan = memory_.scan(place());
   const auto pick = memory_.next(place(), data_->config.picks, now);
+  if (!pick && scan.fill.measured < vision::kMeasuredMin)
+    plc_.raise(plc::Alarm::ScannerBlind, now);
+  else if (new_scan)
+    plc_.clear(plc::Alarm::ScannerBlind, now);
 
   plc::PickResult answer;
   answer.part_id = request_.part_id;
@@ -335,7 +337,7 @@ void Cell::publish(TimePoint now) {
 }
 
 void Cell::tell_why_none(const DetectResult& scan) const {
-  if (scan.fill.measured < kMeasuredMin)
+  if (scan.fill.measured < vision::kMeasuredMin)
     BINPICK_LOG(Warning, "cell", "cycle %llu: only %.0f %% of the supply was measured; %s",
                 static_cast<unsigned long long>(cycle_id_), 100 * scan.fill.measured,
                 robot_carrier_

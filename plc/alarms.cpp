@@ -38,6 +38,11 @@ constexpr std::array kAlarms{
     AlarmText{Alarm::ScannerProfilesLost, "profiles lost in a sweep",
               "The scan counter has gaps: more profiles were lost than a sweep may miss.",
               "Give the scanner a network of its own (100 Mbit/s, no hub) and look at the load of the controller."},
+    AlarmText{Alarm::ScannerBlind, "scanner sees hardly anything",
+              "Nothing was found, and less than 30 % of the supply was measured in this scan: it tells nothing of what "
+              "lies there. Goes with the next scan that sees more.",
+              "Clean the scanner's window; look at its mount and distance, at the sweep's angles or the robot's path, "
+              "and for what is dark, mirrors or shines in; `binpick scan` shows what it sees."},
     AlarmText{Alarm::RobotLost, "robot not connected",
               "The robot's socket closed, or it said nothing for the configured time.",
               "Start the robot's program; check its address and the network."},

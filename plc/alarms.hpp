@@ -18,6 +18,7 @@ enum class Alarm : std::uint16_t {
   ScannerRefused = 202,
   ScannerNoProfiles = 203,
   ScannerProfilesLost = 204,
+  ScannerBlind = 205,  ///< Nothing found, and hardly anything of the supply was measured.
   RobotLost = 300,
   RobotBadLine = 301,
   RobotPathBroken = 302,  ///< It carries the scanner, and did not come to the end of its path.

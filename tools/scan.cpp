@@ -14,7 +14,9 @@
 #include "tools/device_links.hpp"
 #include "tools/output.hpp"
 #include "vision/cloud.hpp"
+#include "vision/depth_image.hpp"
 #include "vision/file.hpp"
+#include "vision/fill_level.hpp"
 #include "vision/registration.hpp"
 
 /// binpick scan CELL.toml -o SCENE.ply: one sweep, saved as a cloud that `detect` reads.
@@ -159,10 +161,19 @@ int scan(const ScanOrder& order) {
     std::fprintf(stderr, "binpick: %s\n", saved.error().text.c_str());
     return 1;
   }
+  vision::DepthImageBuilder builder{0.02 * supply->size_mm.head<2>().maxCoeff(), -supply->size_mm.head<2>() / 2,
+                                    supply->size_mm.head<2>() / 2};
+  builder.add(cloud);
+  const double measured = vision::fill_level(builder.image(), {supply->size_mm}, 1).measured;
   std::printf("%s: %zu points of %zu profiles over supply %u in %.2f s (%llu lost, %zu without a pose)\n",
               order.cloud.c_str(), cloud.size(), done->profiles, supply->id, in_s(done->duration),
               static_cast<unsigned long long>(done->profiles_lost), done->profiles_without_pose);
-  return 0;
+  if (measured >= vision::kMeasuredMin) return 0;
+  std::fprintf(stderr,
+               "binpick: only %.0f %% of supply %u was measured; clean the scanner's window, look at its mount and "
+               "distance, at the sweep's angles, and for what is dark or mirrors\n",
+               100 * measured, unsigned{supply->id});
+  return 1;
 }
 }  // namespace
 

@@ -3,6 +3,9 @@
 #include "vision/depth_image.hpp"
 
 namespace binpick::vision {
+/// Of the supply: a scan that saw less and has found nothing tells little of it.
+inline constexpr double kMeasuredMin = 0.3;
+
 struct FillLevel {
   double share = 0;  ///< Mean height over the floor as a share of the wall height, 0 … 1; 0 when that is not known.
   double occupied_mm2 = 0;  ///< Area of the floor on which something lies.

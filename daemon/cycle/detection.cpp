@@ -71,8 +71,8 @@ DetectResult look(DetectRequest& request) {
   }
 
   result.fill = vision::fill_level(request.image, box, part.noise_mm());
-  result.supply_empty =
-      detections.empty() && result.fill.measured > 0.3 && result.fill.occupied_mm2 < smallest_footprint_mm2(part);
+  result.supply_empty = detections.empty() && result.fill.measured > vision::kMeasuredMin &&
+                        result.fill.occupied_mm2 < smallest_footprint_mm2(part);
   return result;
 }
 }  // namespace

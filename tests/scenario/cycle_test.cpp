@@ -7,6 +7,7 @@
 #include "tests/support/cell_file.hpp"
 #include "tests/support/emulated_cell.hpp"
 #include "tests/support/scenes.hpp"
+#include "vision/fill_level.hpp"
 
 namespace binpick::support {
 namespace {
@@ -148,6 +149,28 @@ TEST(Cycle, AnEmptySupplyIsEmptyAForeignPartIsNothingFoundASteepOneIsNotReachabl
     EXPECT_EQ(result->code, plc::ResultCode::NotReachable);
     EXPECT_GE(result->objects_left, 1);
   }
+}
+
+TEST(Cycle, AScannerThatSeesHardlyAnythingIsAnAlarmUntilTheNextGoodScan) {
+  emulators::World world = scene_of("track_link", 3, 2);
+  Transform<frame::Supply, frame::Object> T_supply_lid;
+  T_supply_lid.iso.translation() = Eigen::Vector3d{0, 0, 530};
+  const auto lid = std::make_shared<const emulators::RayMesh>(emulators::box_mesh({1300, 1100, 2}));
+  const int soot = world.add("lid", lid, T_supply_lid, 0.0005);  // gives no light back
+  EmulatedCell cell{test_folder().load(coarse_cell()), std::move(world)};
+  ASSERT_TRUE(cell.run_until_ready());
+  auto result = cell.pick();
+  ASSERT_TRUE(result.has_value());
+  EXPECT_EQ(result->code, plc::ResultCode::NothingFound);
+  EXPECT_LT(cell.results().back().fill.measured, vision::kMeasuredMin);
+  EXPECT_EQ(cell.plc.alarms(), std::vector{plc::Alarm::ScannerBlind});
+  EXPECT_TRUE(cell.plc.ready() || cell.run_until_ready()) << "the PLC may go on asking";
+
+  ASSERT_TRUE(cell.world.remove(soot));
+  result = cell.pick();
+  ASSERT_TRUE(result.has_value());
+  EXPECT_EQ(result->code, plc::ResultCode::PickFound);
+  EXPECT_TRUE(cell.run_until([&] { return !cell.plc.alarm_active(); }, 1s));
 }
 
 TEST(Cycle, NoSweepWhileTheRobotIsInTheView) {

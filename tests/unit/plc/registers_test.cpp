@@ -73,7 +73,7 @@ TEST(Tables, EveryCodeHasNameCauseAndCure) {
     EXPECT_FALSE(text.cure.empty());
     EXPECT_EQ(to_string(text.alarm), text.name);
   }
-  EXPECT_EQ(alarm_table().size(), 25U);
+  EXPECT_EQ(alarm_table().size(), 26U);
   for (const ResultText& text : result_table()) {
     EXPECT_TRUE(names.insert(text.name).second) << text.name;
     EXPECT_FALSE(text.cause.empty());
