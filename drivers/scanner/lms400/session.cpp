@@ -64,6 +64,7 @@ struct Session::Impl {
   scanner::ScanClock clock;
   std::uint64_t lost = 0, skipped = 0, skipped_reported = 0;
   bool garbage_since_answer = false;
+  bool has_telegram = false;  // of this connection
 
   explicit Impl(const Options& o) : options{o} {}
 
@@ -297,9 +298,16 @@ struct Session::Impl {
     push(ProfileReceived{std::move(profile)});
   }
 
+  std::string stranger_text() const {
+    return "what answers at the scanner's address is no LMS 400 (" + std::to_string(skipped) +
+           " bytes of no telegram): a wrong device or port, or a broken line; check the address in [scanner], then the "
+           "cable";
+  }
+
   void on_timeout() {
     const bool is_garbled = garbage_since_answer;
     const Failed::Why why = is_garbled ? Failed::Why::BadTelegram : Failed::Why::NoReply;
+    if (is_garbled && !has_telegram) return fail(why, stranger_text());
     const Step step = steps.front();
     fail(why, std::string{"scanner does not answer "} + words(step) +
                   (is_garbled ? ", what comes is garbled (" + std::to_string(skipped) +
@@ -315,6 +323,7 @@ void Session::on_connected(TimePoint now) {
   impl_->reset();
   impl_->reopen = false;
   impl_->skipped = impl_->skipped_reported = 0;
+  impl_->has_telegram = false;
   impl_->state = State::Starting;
   for (const Step step : {Step::StopOld, Step::LogIn, Step::Filter, Step::Remission, Step::ScanConfig})
     impl_->add(step, now);
@@ -322,6 +331,11 @@ void Session::on_connected(TimePoint now) {
 
 void Session::on_disconnected(TimePoint) {
   if (impl_->state == State::Offline) return;
+  if (impl_->skipped > 0 && !impl_->has_telegram) {
+    impl_->fail(Failed::Why::BadTelegram, impl_->stranger_text());
+    impl_->reopen = false;  // it has closed by itself
+    return;
+  }
   impl_->fail(Failed::Why::LinkLost, "connection to the scanner lost; check its power and cable");
 }
 
@@ -346,6 +360,7 @@ void Session::on_bytes(ByteView bytes, TimePoint now) {
     if (!*decoded) break;
     at += (*decoded)->consumed;
     s.garbage_since_answer = false;
+    s.has_telegram = true;
     if (const Text* text = std::get_if<Text>(&(*decoded)->message))
       s.on_text(text->text, now);
     else

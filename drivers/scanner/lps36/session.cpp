@@ -225,10 +225,12 @@ struct Session::Impl {
                      ": it has a permanent fault; switch it off and on; if it comes again, have it "
                      "serviced");
     const bool is_in_menu = said.mode() == Mode::Menu;
-    if (step.ask == Ask::Check)
-      return refused(with_status + (is_in_menu ? ": someone is in the menu of its display; leave the menu"
-                                               : ": it has left command mode; it was switched off and on, or another "
-                                                 "program uses it"));
+    if (step.ask == Ask::Check && is_in_menu)
+      return refused(with_status + ": someone is in the menu of its display; leave the menu");
+    if (step.ask == Ask::Check)  // it refuses nothing: it was away, and knows us no more
+      return fail(Failed::Why::NoReply, "scanner has left command mode" + with_status +
+                                            ": it was switched off and on, or another program uses it; check its "
+                                            "power if it comes again");
     if (is_in_menu || step.ask == Ask::Connect) {
       if (!busy_until) busy_until = now + options.busy_timeout;
       if (now + kRetry < *busy_until) {

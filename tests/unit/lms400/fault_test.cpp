@@ -106,6 +106,27 @@ TEST(Lms400Fault, CausesAreToldApart) {
   EXPECT_EQ(first_failure([](Pair& p) { p.device.faults.disconnect_after_bytes = 5; }).why, Failed::Why::LinkLost);
 }
 
+TEST(Lms400Fault, AnotherDeviceAtItsAddressIsNoCableFault) {
+  const std::string words = "HTTP/1.0 400 Bad Request\r\n\r\n";
+  for (const bool closes : {true, false}) {
+    const TimePoint now{1h};
+    Session session{Options{}};
+    session.on_connected(now);
+    session.on_bytes(std::as_bytes(std::span{words}), now);
+    if (closes)
+      session.on_disconnected(now);
+    else
+      session.on_deadline(now + 2s);
+    const auto event = session.take_event();
+    ASSERT_TRUE(event.has_value());
+    const auto& failed = std::get<Failed>(*event);
+    EXPECT_EQ(failed.why, Failed::Why::BadTelegram) << "alarm 201, not 200";
+    EXPECT_NE(failed.text.find("is no LMS 400 (28 bytes of no telegram): a wrong device or port"), std::string::npos)
+        << failed.text;
+    EXPECT_EQ(session.take_reopen(), !closes);
+  }
+}
+
 TEST(Lms400Fault, ByteByByteIsSlowButRight) {
   Pair pair;
   pair.device.faults.split_every_byte = true;

@@ -121,10 +121,10 @@ TEST(Lps36Fault, WhileIdleCausesAreToldApartToo) {
             "scanner does not answer the idle check; check its power, its cable, its address and the port that it "
             "sends to");
   const auto restarted = first_failure([](Pair& p) { p.device.power_cycle(p.now); }, false);
-  EXPECT_EQ(restarted.why, Why::Refused);
+  EXPECT_EQ(restarted.why, Why::NoReply) << "it refuses nothing: the alarm's cure is about its supply";
   EXPECT_EQ(restarted.text,
-            "scanner refused the idle check (status 0x0110): it has left command mode; it was switched off and on, or "
-            "another program uses it");
+            "scanner has left command mode (status 0x0110): it was switched off and on, or another program uses it; "
+            "check its power if it comes again");
   const auto menu = first_failure([](Pair& p) { p.device.in_menu = true; }, false);
   EXPECT_EQ(menu.text,
             "scanner refused the idle check (status 0x0121): someone is in the menu of its display; leave the menu");
