@@ -10,10 +10,20 @@
 namespace binpick::daemon {
 namespace link = drivers::link;
 namespace {
-link::Endpoint endpoint(const std::string& text, const char* key) {
+link::Endpoint endpoint(const std::string& text) {
   auto parsed = link::parse_endpoint(text);
-  if (!parsed) throw std::runtime_error(std::string(key) + ": " + parsed.error());
+  if (!parsed) throw std::runtime_error(parsed.error());
   return *parsed;
+}
+
+/// A socket that cannot be opened is told by its key.
+template <class Open>
+void open_for(const char* key, Open open) {
+  try {
+    open();
+  } catch (const std::runtime_error& failure) {
+    throw std::runtime_error(std::string{key} + ": " + failure.what());
+  }
 }
 
 link::ServerPeer plc_peer(Cell& cell) {
@@ -59,13 +69,15 @@ Links::Links(link::Loop& loop, Cell& cell)
   open_plc(loop);
   open_poses(loop);
   if (cell.data().config.robot_listen.empty()) return;  // the PLC forwards the movement
-  robot_.emplace(loop, endpoint(cell.data().config.robot_listen, "robot.listen"),
-                 one_robot(
-                     robot_connection_, [this](TimePoint now) { cell_.robot().on_connected(now); },
-                     [this](ByteView bytes, TimePoint now) { cell_.robot().on_bytes(bytes, now); },
-                     [this](TimePoint now) { cell_.robot().on_disconnected(now); },
-                     [this] { return cell_.robot().take_output(); }),
-                 link::TcpServerOptions{.connections_max = 2, .newest_wins = true});
+  open_for("robot.listen", [&] {
+    robot_.emplace(loop, endpoint(cell.data().config.robot_listen),
+                   one_robot(
+                       robot_connection_, [this](TimePoint now) { cell_.robot().on_connected(now); },
+                       [this](ByteView bytes, TimePoint now) { cell_.robot().on_bytes(bytes, now); },
+                       [this](TimePoint now) { cell_.robot().on_disconnected(now); },
+                       [this] { return cell_.robot().take_output(); }),
+                   link::TcpServerOptions{.connections_max = 2, .newest_wins = true});
+  });
 }
 
 /// A server of which one connection counts: a robot that lost power never closed its old one, so the new one replaces
@@ -106,37 +118,42 @@ void Links::open_poses(link::Loop& loop) {
   const auto& config = cell_.data().config;
   drivers::robot::PoseSource& poses = *cell_.poses();
   if (poses.cell_connects()) {
-    pose_client_.emplace(loop, endpoint(config.pose_address, "robot.pose_address"),
-                         link::StreamPeer{
-                             .on_connected = [&poses](TimePoint now) { poses.on_connected(now); },
-                             .on_bytes = [&poses](ByteView bytes, TimePoint now) { poses.on_bytes(bytes, now); },
-                             .on_disconnected = [&poses](TimePoint now) { poses.on_disconnected(now); },
-                             .take_output = [&poses] { return poses.take_output(); },
-                         });
+    open_for("robot.pose_address", [&] {
+      pose_client_.emplace(loop, endpoint(config.pose_address),
+                           link::StreamPeer{
+                               .on_connected = [&poses](TimePoint now) { poses.on_connected(now); },
+                               .on_bytes = [&poses](ByteView bytes, TimePoint now) { poses.on_bytes(bytes, now); },
+                               .on_disconnected = [&poses](TimePoint now) { poses.on_disconnected(now); },
+                               .take_output = [&poses] { return poses.take_output(); },
+                           });
+    });
     return;
   }
-  pose_server_.emplace(
-      loop, endpoint(config.pose_listen, "robot.pose_listen"),
-      one_robot(
-          pose_connection_, [&poses](TimePoint now) { poses.on_connected(now); },
-          [&poses](ByteView bytes, TimePoint now) { poses.on_bytes(bytes, now); },
-          [&poses](TimePoint now) { poses.on_disconnected(now); }, [&poses] { return poses.take_output(); }),
-      link::TcpServerOptions{.connections_max = 2, .newest_wins = true});
+  open_for("robot.pose_listen", [&] {
+    pose_server_.emplace(
+        loop, endpoint(config.pose_listen),
+        one_robot(
+            pose_connection_, [&poses](TimePoint now) { poses.on_connected(now); },
+            [&poses](ByteView bytes, TimePoint now) { poses.on_bytes(bytes, now); },
+            [&poses](TimePoint now) { poses.on_disconnected(now); }, [&poses] { return poses.take_output(); }),
+        link::TcpServerOptions{.connections_max = 2, .newest_wins = true});
+  });
 }
 
 void Links::open_plc(link::Loop& loop) {
   const auto& config = cell_.data().config;
   if (config.plc.role == plc::LineRole::Client)
-    plc_client_.emplace(loop, endpoint(config.plc.address, "plc.address"), plc_server_of(cell_));
+    open_for("plc.address", [&] { plc_client_.emplace(loop, endpoint(config.plc.address), plc_server_of(cell_)); });
   else
-    plc_server_.emplace(loop, endpoint(config.plc_listen, "plc.listen"), plc_peer(cell_));
+    open_for("plc.listen", [&] { plc_server_.emplace(loop, endpoint(config.plc_listen), plc_peer(cell_)); });
 }
 
 /// Attempts fail alike: told when the reason changes. What a session closed it has told itself.
 void Links::tell(const char* device, const std::string& address, const std::string& error, std::string& told) {
   if (std::exchange(told, error) == error || error.empty() || error == drivers::link::kClosedByUs) return;
-  BINPICK_LOG(Warning, device, "no connection to %s: %s; check the address in the cell file, power and cable",
-              address.c_str(), error.c_str());
+  const bool has_remedy = error.find(';') != std::string::npos;
+  BINPICK_LOG(Warning, device, "no connection to %s: %s%s", address.c_str(), error.c_str(),
+              has_remedy ? "" : "; check the address in the cell file, power and cable");
 }
 
 void Links::on_deadline(TimePoint now) {

@@ -115,6 +115,21 @@ Expected<std::vector<SocketAddress>, std::string> Resolver::take_result() {
   return std::move(shared_->result);
 }
 
+std::string no_port_text(int error) {
+  const std::string why = std::generic_category().message(error);
+  switch (error) {
+    case EADDRINUSE:
+      return why + "; end the program that has it (ss -lntup tells), or use another port";
+    case EADDRNOTAVAIL:
+      return why + "; this machine has no such address (ip address tells), use one that it has or 0.0.0.0";
+    case EACCES:
+      return why +
+             "; ports below 1024 need the capability that the service has, use one above or run it as the service";
+    default:
+      return why;
+  }
+}
+
 void set_stream_options(int fd) {
   const auto set = [fd](int level, int option, int value) { ::setsockopt(fd, level, option, &value, sizeof value); };
   set(IPPROTO_TCP, TCP_NODELAY, 1);

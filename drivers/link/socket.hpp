@@ -46,6 +46,9 @@ class Resolver {
   std::shared_ptr<Shared> shared_;
 };
 
+/// Why a port of our own could not be had, and what to do.
+std::string no_port_text(int error);
+
 /// No Nagle delay, keep-alive after 3 s of silence, and unacknowledged bytes are given up after 3 s: a peer that lost
 /// its power sends no FIN.
 void set_stream_options(int fd);

@@ -48,8 +48,7 @@ TcpServer::TcpServer(Loop& loop, const Endpoint& listen, ServerPeer peer, TcpSer
     if (listen_fd_ >= 0) break;
     why = errno;
   }
-  if (listen_fd_ < 0)
-    throw std::runtime_error("cannot listen on " + to_string(listen) + ": " + std::generic_category().message(why));
+  if (listen_fd_ < 0) throw std::runtime_error("cannot listen on " + to_string(listen) + ": " + no_port_text(why));
   spare_fd_ = open_spare();
   loop_.watch(listen_fd_, EPOLLIN, [this](std::uint32_t, TimePoint now) { accept_all(now); });
 }

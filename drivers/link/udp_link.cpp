@@ -45,7 +45,7 @@ bool UdpLink::bind_to(const SocketAddress& address, std::string& why) {
   const int one = 1;
   ::setsockopt(fd_, SOL_SOCKET, SO_TIMESTAMPNS, &one, sizeof one);  // without it the loop's time stamp serves
   if (::bind(fd_, address.raw(), address.length) != 0) {
-    why = error_text(errno);
+    why = no_port_text(errno);
     ::close(fd_);
     fd_ = -1;
     return false;
@@ -95,7 +95,8 @@ void UdpLink::open(TimePoint now) {
   else
     reinterpret_cast<sockaddr_in*>(&local.storage)->sin_port = htons(listen_port_);
   std::string why;
-  if (!bind_to(local, why)) return close(now, "UDP port " + std::to_string(listen_port_) + ": " + why);
+  if (!bind_to(local, why))
+    return close(now, "own UDP port " + std::to_string(listen_port_) + " (listen_port in the cell file): " + why);
   up_ = true;
   last_why_.clear();
   if (peer_.on_connected) peer_.on_connected(now);

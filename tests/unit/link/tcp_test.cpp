@@ -470,7 +470,21 @@ TEST(Tcp, ListeningTwiceOnOnePortSaysWhichAndWhy) {
     FAIL() << "no exception";
   } catch (const std::runtime_error& error) {
     EXPECT_EQ(std::string(error.what()),
-              "cannot listen on 127.0.0.1:" + std::to_string(server.port()) + ": Address already in use");
+              "cannot listen on 127.0.0.1:" + std::to_string(server.port()) +
+                  ": Address already in use; end the program that has it (ss -lntup tells), or use another port");
+  }
+}
+
+TEST(Tcp, AnAddressOfAnotherMachineSaysWhatToDo) {
+  Loop loop;
+  ServerSide s;
+  try {
+    TcpServer server{loop, {"192.0.2.1", 0}, s.peer()};
+    FAIL() << "no exception";
+  } catch (const std::runtime_error& error) {
+    EXPECT_EQ(std::string(error.what()),
+              "cannot listen on 192.0.2.1:0: Cannot assign requested address; this machine has no such address (ip "
+              "address tells), use one that it has or 0.0.0.0");
   }
 }
 
