@@ -192,6 +192,8 @@ class PlcPort : public ClientPort<Plc> {
   /// `endpoint` is the daemon's, or where the PLC listens. Throws std::runtime_error when it cannot listen there.
   PlcPort(drivers::link::Loop& loop, const drivers::link::Endpoint& endpoint, Plc plc);
   void turn(TimePoint now);
+  bool connected() const { return server_ ? connection_ != 0 : ClientPort::connected(); }
+  std::string last_error() const { return server_ ? "no daemon polls it" : ClientPort::last_error(); }
 
  private:
   drivers::link::ConnectionId connection_ = 0;

@@ -218,8 +218,15 @@ void Run::turn_plc(TimePoint now) {
       pick_wanted_ = false;
       step_ = Step::Asked;
       step_since_ = now;
+      asked_boot_ = plc.boot_count();
       return;
     case Step::Asked:
+      if (plc.boot_count() != 0 && plc.boot_count() != asked_boot_) {  // 0: this PLC was, and has not read yet
+        say("PLC: the daemon was restarted, which voids request %u; it is asked again", plc.sequence());
+        step_ = Step::Idle;
+        pick_wanted_ = true;
+        return;
+      }
       if (now - step_since_ < kAnswerMax) return;
       say("PLC: no answer to request %u within %.0f s, abort", plc.sequence(), in_s(kAnswerMax));
       plc.raise_abort();
@@ -374,7 +381,12 @@ void Run::obey(Order::Kind order, TimePoint now) {
   };
   switch (order) {
     case Order::Kind::Pick:
-      if (played(plc_ != nullptr, Device::Plc)) pick_wanted_ = true;
+      if (!played(plc_ != nullptr, Device::Plc)) break;
+      pick_wanted_ = true;
+      if (step_ != Step::Idle)
+        say("PLC: request %u is not done yet; a pick is asked for after it", plc_->device.sequence());
+      else if (!plc_->device.ready())
+        say("PLC: the cell is not ready (%04x); a pick is asked for as soon as it is", plc_->device.not_ready());
       break;
     case Order::Kind::Take:
       say(bin_.take_highest() ? "bin: the highest object is gone, %zu left" : "bin: nothing to take, %zu left",

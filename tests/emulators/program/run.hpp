@@ -82,6 +82,7 @@ class Run {
 
   Step step_ = Step::Idle;
   TimePoint step_since_{}, next_request_{}, next_reset_{};
+  std::uint16_t asked_boot_ = 0;  ///< Of the daemon that was asked.
   bool pick_wanted_ = false;
   std::map<std::uint16_t, Pick> picks_;
   std::uint16_t picking_ = 0;
