@@ -70,6 +70,11 @@ int export_plc(const Wish& wish) {
   if (wish.role == "client") options.role = plc::LineRole::Client;
   if (!wish.cell.empty())
     if (const std::string trouble = take_cell(wish, options); !trouble.empty()) return refuse(trouble, 2);
+  if (!wish.host.empty() && wish.make == "logix")
+    return refuse(
+        "--host is for s7, whose program connects by itself; leave it out, a Logix PLC has the cell "
+        "controller's address in its Modbus client (docs/plc/studio-5000.md)",
+        2);
   if (!wish.host.empty()) {
     const auto host = parse_ipv4(wish.host);
     if (!host)
@@ -108,7 +113,7 @@ void add_export(CLI::App& app, int& exit_status) {
   plc->add_option("--cell", wish->cell,
                   "cell file: port, base address, pose convention and time-outs are taken from it");
   plc->add_option("--host", wish->host,
-                  "the cell controller's address as the PLC sees it (default: the cell file's, else 192.168.0.20)");
+                  "s7: the cell controller's address as the PLC sees it (default: the cell file's, else 192.168.0.20)");
   plc->callback([wish, &exit_status] { exit_status = export_plc(*wish); });
 }
 }  // namespace binpick::tools

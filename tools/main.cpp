@@ -14,10 +14,10 @@ std::string one_line(std::string text) {
   return text;
 }
 
-/// "binpick train" of a line that began so: whose help is worth reading.
+/// "binpick export plc" of a line that began so: whose help is worth reading.
 std::string spoken_to(const CLI::App& app) {
   const auto chosen = app.get_subcommands();
-  return chosen.empty() ? app.get_name() : app.get_name() + " " + chosen.front()->get_name();
+  return chosen.empty() ? app.get_name() : app.get_name() + " " + spoken_to(*chosen.front());
 }
 }  // namespace
 

@@ -50,6 +50,12 @@ TEST(ExportCommand, TakesPortAndTimeOutsFromTheCellFile) {
   EXPECT_NE(scl.find("ur: m, rotation vector in rad"), std::string::npos);
 }
 
+TEST(ExportCommand, AHostThatWouldStandNowhereIsWrongInput) {
+  const Answer answer = export_plc({"--for", "logix", "--host", "10.0.0.7"});
+  EXPECT_EQ(answer.exit_status, 2);
+  EXPECT_TRUE(answer.err.starts_with("binpick export: --host is for s7, ")) << answer.err;
+}
+
 TEST(ExportCommand, ACellFileForTheOtherMakeIsWrongInput) {
   const config::CellFolder folder;
   ASSERT_TRUE(folder.load().has_value());
