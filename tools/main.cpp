@@ -24,7 +24,8 @@ std::string spoken_to(const CLI::App& app) {
 int main(int argc, char** argv) {
   using namespace binpick;
   CLI::App app{
-      "The command beside binpickd: check and calibrate a cell, reach its devices, train parts, detect them, program its PLC.",
+      "The command beside binpickd: check and calibrate a cell, reach its devices, train parts, detect them, program "
+      "its PLC.",
       "binpick"};
   app.require_subcommand(1);
   app.set_version_flag("--version", "binpick " BINPICK_VERSION);

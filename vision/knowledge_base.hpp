@@ -98,8 +98,8 @@ class KnowledgeBase {
 /// The symmetry that the options give, completed, or the one found from the mesh.
 Symmetry symmetry_of(const Mesh& mesh, const PartOptions& options);
 
-/// The first of the part's options that was another one when the knowledge base was trained ("pixel_mm"); empty: none of
-/// those that it tells of. What has its default now is compared where that does not take the training itself.
+/// The first of the part's options that was another one when the knowledge base was trained ("pixel_mm"); empty: none
+/// of those that it tells of. What has its default now is compared where that does not take the training itself.
 std::string other_option(const KnowledgeBase& trained, const PartOptions& options);
 
 /// Renders the mesh in every training rotation and stores votes (docs/vision.md, training).

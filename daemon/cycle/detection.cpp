@@ -58,8 +58,8 @@ DetectResult look(DetectRequest& request) {
   limits.T_base_supply.iso = supply.T_base_supply.iso * result.place.T_said_found;
   std::optional<vision::GripperScene> scene;
   if (recipe.part.gripper) scene.emplace(request.image, part.mesh(), part.noise_mm(), *recipe.part.gripper);
-  result.choice = vision::choose_grasps(result.report, part.symmetry(), recipe.part.grasps, box, limits,
-                                        scene ? &*scene : nullptr);
+  result.choice =
+      vision::choose_grasps(result.report, part.symmetry(), recipe.part.grasps, box, limits, scene ? &*scene : nullptr);
 
   Eigen::AlignedBox3f extents;
   for (const auto& vertex : part.mesh().vertices_mm) extents.extend(vertex);
