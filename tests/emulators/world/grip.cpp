@@ -155,6 +155,25 @@ Closing close_jaws(const Gripper& gripper, const Grasp& grasp, const std::vector
   return closing;
 }
 
+/// The same; jaws that hold from within slide to where the bore is widest.
+Closing close_and_centre(const Gripper& gripper, const Grasp& grasp, const std::vector<Thing>& things, int target,
+                         const GripRules& rules) {
+  constexpr double kStep_mm = 0.5;
+  Closing best = close_jaws(gripper, grasp, things, target, rules);
+  if (!from_within(grasp, grasp.opening_mm.value_or(gripper.jaws->opening_max_mm))) return best;
+  const int steps = static_cast<int>(rules.centres_mm / kStep_mm);
+  for (int k = -steps; k <= steps; ++k) {
+    std::vector<Thing> moved = things;
+    for (Thing& thing : moved)
+      if (thing.id == target) thing.T_thing_tcp = thing.T_thing_tcp * Eigen::Translation3d(0, -k * kStep_mm, 0);
+    Closing other = close_jaws(gripper, grasp, moved, target, rules);
+    if (!other.closed || (best.closed && other.closed->jaws_mm <= best.closed->jaws_mm + 1e-6)) continue;
+    other.closed->across_mm = k * kStep_mm;
+    best = other;
+  }
+  return best;
+}
+
 /// Without jaws: the share of the foremost face that lies on the target.
 double share_that_lies(const Gripper& gripper, const RayMesh& mesh, const Isometry3d& T_object_tcp,
                        const GripRules& rules) {
@@ -233,6 +252,7 @@ GripRules GripRules::of(const ExamplePart& part) {
   rules.width_mm = 0.8;
   rules.touch_mm = 0.4;
   rules.push_mm = 1;
+  rules.centres_mm = 1;
   rules.step_mm = 1;
   return rules;
 }
@@ -277,8 +297,8 @@ GripResult grip(const LivingPile& pile, const Gripper& gripper, const std::vecto
   if (gripper.jaws) {
     const auto nominal = closed_on(*target.mesh, gripper, grasp, rules);
     if (!nominal) return missed(result, "grasp \"" + grasp.name + "\" touches nothing of the part");
-    const auto closing =
-        close_jaws(gripper, grasp, things_near(world, gripper, grasp, motion.T_supply_grasp), result.object, rules);
+    const auto closing = close_and_centre(gripper, grasp, things_near(world, gripper, grasp, motion.T_supply_grasp),
+                                          result.object, rules);
     if (!closing.closed) return missed(result, "the object is not between the jaws");
     if (closing.between)
       return missed(result, *closing.between == 0
@@ -317,7 +337,7 @@ GripResult grip(const LivingPile& pile, const Gripper& gripper, const std::vecto
 
   std::vector<LivingPile::Pose> carried{target.T_supply_object};
   std::vector<TcpPose> tcp{motion.T_supply_grasp};
-  const Isometry3d T_tcp_object = Eigen::Translation3d(closed.off_middle_mm, 0, 0) *
+  const Isometry3d T_tcp_object = Eigen::Translation3d(closed.off_middle_mm, closed.across_mm, 0) *
                                   (motion.T_supply_grasp.iso.inverse() * target.T_supply_object.iso);
   for (const auto* way : {&retreat, &up})
     for (const TcpPose& T_supply_tcp : *way) {

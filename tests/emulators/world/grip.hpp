@@ -18,7 +18,8 @@
 ///    the grasp pose. Every box and cylinder of the gripper is tested against every triangle of objects, walls and
 ///    floor. A surface deeper than `hit_mm` inside one of them is a collision, the target's own surface too.
 /// 2. The jaws close along x (a grip from within opens them) until both touch the target. The object slides along x
-///    until it is in the middle. It is held when both faces touch it over a fair area (`contact_share` of what the
+///    until it is in the middle; jaws that open in a bore also slide along its flanks, `centres_mm` at most, to where
+///    they stand widest. It is held when both faces touch it over a fair area (`contact_share` of what the
 ///    grasp in its own place would touch, within `touch_mm`), when the jaws then stand as far apart as there, within
 ///    `width_mm`, and when nothing else is between them. Without jaws it is held when the foremost face lies on it
 ///    flatly.
@@ -34,7 +35,8 @@ struct GripRules {
   double touch_mm = 1;
   double contact_share = 0.3;
   double push_mm = 3;
-  double step_mm = 2;  ///< Between two looks along the way.
+  double centres_mm = 3;  ///< Jaws that open in a bore slide along its flanks so far, to where they stand widest.
+  double step_mm = 2;     ///< Between two looks along the way.
 
   /// Parts that a light-section scanner sees are small: 1 mm, and the rest in proportion.
   static GripRules of(const ExamplePart& part);
@@ -72,6 +74,7 @@ bool stands_free(const World& world, const vision::Gripper& gripper, const visio
 struct Closed {
   double jaws_mm = 0;                ///< Between the inner faces.
   double off_middle_mm = 0;          ///< The object slides so far along the tcp's x.
+  double across_mm = 0;              ///< And along its y, where jaws that open in a bore centre it.
   std::size_t touching[2] = {0, 0};  ///< Sampled places of each face (-x, +x) that touch.
 };
 std::optional<Closed> closed_on(const RayMesh& part, const vision::Gripper& gripper, const vision::Grasp& grasp,
