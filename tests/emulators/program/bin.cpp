@@ -10,15 +10,15 @@
 #include <stdexcept>
 
 #include "tests/emulators/world/example_parts.hpp"
-#include "tests/emulators/world/pile.hpp"
 #include "vision/knowledge_base.hpp"
 
 namespace binpick::emulators {
 namespace {
-/// Within this the jaws close on the object; beyond they miss it or push it away.
+/// Of a part without a gripper: within this its object is taken.
 constexpr double kGripMm = 15;
 constexpr double kGripRad = 10 * std::numbers::pi / 180;
-/// Symmetry is taken from the mesh when there is no knowledge base to ask.
+/// Parts whose file names no scanner are of the class for small ones below this, as in training.
+constexpr double kSmallMm = 150;
 
 /// A body for the physics of a part that is not ours: the hull of its mesh, by its outermost points in many directions.
 ConvexPiece hull_of(const vision::Mesh& mesh) {
@@ -45,6 +45,9 @@ ExamplePart body_of(const config::Part& part, const vision::Mesh& mesh) {
   own.name = stem;
   own.mesh = mesh;
   own.pieces = {hull_of(mesh)};
+  const auto scanner = part.options.scanner;
+  own.scanner =
+      (scanner ? *scanner != vision::ScannerClass::Lms400 : mesh.diameter_mm() < kSmallMm) ? "lps36" : "lms400";
   return own;
 }
 
@@ -68,26 +71,26 @@ Bin::Bin(const config::Config& config, const BinOptions& options)
       symmetry_{symmetry_of(config.recipes.at(options.recipe), mesh_)},
       radius_mm_{mesh_.diameter_mm() / 2},
       seed_{options.seed},
-      world_{fill(options.seed)} {}
+      pile_{fill(options.seed)} {}
 
-World Bin::fill(std::uint64_t seed) const {
-  return make_pile(body_of(part_, mesh_), options_.objects, supply_.size_mm, seed);
+LivingPile Bin::fill(std::uint64_t seed) const {
+  return {body_of(part_, mesh_), options_.objects, supply_.size_mm, seed};
 }
 
-std::size_t Bin::objects_left() const { return world_.objects().size(); }
+std::size_t Bin::objects_left() const { return world().objects().size(); }
 
 std::size_t Bin::overlapping() const {
   constexpr double kGridMm = 10;
   constexpr double kAboveMm = 100;  // over the highest wall or object
   const Eigen::Vector3d size = supply_.size_mm;
   double top = size.z();
-  for (const World::Object& object : world_.objects()) top = std::max(top, double{object.box.max().z()});
+  for (const World::Object& object : world().objects()) top = std::max(top, double{object.box.max().z()});
   std::set<int> found;
   for (double x = -size.x() / 2; x < size.x() / 2; x += kGridMm)
     for (double y = -size.y() / 2; y < size.y() / 2; y += kGridMm) {
       std::set<int> in_line;
       Eigen::Vector3d from{x, y, top + kAboveMm};
-      while (const auto hit = world_.cast(from, -Eigen::Vector3d::UnitZ(), from.z() + 1)) {
+      while (const auto hit = world().cast(from, -Eigen::Vector3d::UnitZ(), from.z() + 1)) {
         if (hit->object == 0) break;
         in_line.insert(hit->object);
         from.z() -= hit->distance_mm + 0.1;
@@ -102,7 +105,7 @@ std::optional<Bin::Nearest> Bin::nearest(const Transform<frame::Base, frame::Tcp
   double least = std::numeric_limits<double>::max();
   for (const vision::Grasp& grasp : part_.grasps) {
     const auto T_supply_object = supply_.T_base_supply.inverse() * T_base_grasp * grasp.T_object_tcp.inverse();
-    for (const World::Object& object : world_.objects()) {
+    for (const World::Object& object : world().objects()) {
       const auto error = vision::pose_distance(T_supply_object.iso, object.T_supply_object.iso, symmetry_, radius_mm_);
       const double apart = error.centroid_mm + radius_mm_ * error.angle_rad;
       if (apart >= least) continue;
@@ -113,18 +116,32 @@ std::optional<Bin::Nearest> Bin::nearest(const Transform<frame::Base, frame::Tcp
   return best;
 }
 
-bool Bin::take(const Transform<frame::Base, frame::Tcp>& T_base_grasp) {
-  const auto found = nearest(T_base_grasp);
-  if (!found || found->error.centroid_mm > kGripMm || found->error.angle_rad > kGripRad) return false;
-  return world_.remove(found->object);
+GripResult Bin::take(const Transform<frame::Base, frame::Tcp>& T_base_approach,
+                     const Transform<frame::Base, frame::Tcp>& T_base_grasp) {
+  GripResult result;
+  if (part_.gripper) {
+    const auto T_supply_base = supply_.T_base_supply.inverse();
+    result = grip(pile_, *part_.gripper, part_.grasps, symmetry_,
+                  {T_supply_base * T_base_approach, T_supply_base * T_base_grasp}, GripRules::of(pile_.part()));
+  } else if (const auto found = nearest(T_base_grasp)) {
+    result.object = found->object;
+    const bool is_near = found->error.centroid_mm <= kGripMm && found->error.angle_rad <= kGripRad;
+    if (is_near)
+      result.kind = GripResult::Kind::Taken;
+    else
+      result.what = "every object is too far away";
+  }
+  if (result.kind == GripResult::Kind::Taken) pile_.take(result.object);
+  return result;
 }
 
 bool Bin::take_highest() {
-  const auto& objects = world_.objects();
+  const auto& objects = world().objects();
   if (objects.empty()) return false;
   const auto highest =
       std::ranges::max_element(objects, {}, [](const World::Object& object) { return object.box.max().z(); });
-  return world_.remove(highest->id);
+  pile_.take(highest->id);
+  return true;
 }
 
 void Bin::start_refill() {
@@ -135,7 +152,7 @@ void Bin::start_refill() {
 
 bool Bin::poll_refill() {
   if (!refilling() || next_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return false;
-  world_ = next_.get();
+  pile_ = next_.get();
   return true;
 }
 }  // namespace binpick::emulators

@@ -6,7 +6,8 @@
 #include <string>
 
 #include "config/config.hpp"
-#include "tests/emulators/world/world.hpp"
+#include "tests/emulators/world/grip.hpp"
+#include "tests/emulators/world/living_pile.hpp"
 #include "vision/symmetry.hpp"
 
 /// The emulated supply with its objects, and the truth about them.
@@ -23,7 +24,7 @@ class Bin {
   /// Drops the objects and lets them settle: takes seconds. Throws std::runtime_error (a mesh that cannot be read).
   Bin(const config::Config& config, const BinOptions& options);
 
-  const World& world() const { return world_; }
+  const World& world() const { return pile_.world(); }
   std::size_t objects_left() const;
   /// Objects that lie over or under another one, seen from above.
   std::size_t overlapping() const;
@@ -36,9 +37,11 @@ class Bin {
     vision::PoseDistance error;
   };
   std::optional<Nearest> nearest(const Transform<frame::Base, frame::Tcp>& T_base_grasp) const;
-  /// What closing the gripper there does: true when an object was between the jaws (within 15 mm and 10 degrees). It is
-  /// taken out of the bin.
-  bool take(const Transform<frame::Base, frame::Tcp>& T_base_grasp);
+  /// What comes of sending the gripper there by way of the approach pose (grip.hpp). A part file without a gripper says
+  /// too little for that: its objects are taken within 15 mm and 10 degrees. A taken object leaves the bin, and the
+  /// others settle again.
+  GripResult take(const Transform<frame::Base, frame::Tcp>& T_base_approach,
+                  const Transform<frame::Base, frame::Tcp>& T_base_grasp);
   /// The highest object goes. False when the bin is empty.
   bool take_highest();
 
@@ -48,7 +51,7 @@ class Bin {
   bool poll_refill();  ///< True once, when the new objects are in.
 
  private:
-  World fill(std::uint64_t seed) const;
+  LivingPile fill(std::uint64_t seed) const;
 
   const config::Supply& supply_;
   const config::Part& part_;
@@ -57,7 +60,7 @@ class Bin {
   vision::Symmetry symmetry_;
   double radius_mm_ = 0;
   std::uint64_t seed_;
-  World world_;
-  std::future<World> next_;
+  LivingPile pile_;
+  std::future<LivingPile> next_;
 };
 }  // namespace binpick::emulators

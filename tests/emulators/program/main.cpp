@@ -113,6 +113,11 @@ int main(int argc, char** argv) {
   app.add_option("--tolerance-mm", run.tolerance_mm, "a pick that is further off makes the run fail")
       ->capture_default_str();
   app.add_option("--tolerance-deg", run.tolerance_deg, "the same for its rotation")->capture_default_str();
+  app.add_option("--failed-grips", run.failed_grips,
+                 "share of the picks, rounded up, that the gripper may fail at though the pose is right; more make the "
+                 "run fail")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
   app.add_option("--timeout", arguments.timeout_s, "s until the run is given up; default: 60 and 20 for each cycle");
   app.add_flag("--serve", arguments.serve, "go on until told to quit; same as --cycles 0");
   app.add_option("--without", arguments.without, "of cell: a device that is real, or played elsewhere")

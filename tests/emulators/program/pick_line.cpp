@@ -29,7 +29,8 @@ void add_figures(std::string& line, const plc::CycleFigures& figures) {
 
 PickVerdict judge(const PickSeen& pick, double tolerance_mm, double tolerance_deg) {
   PickVerdict verdict;
-  verdict.good = pick.nearest.has_value() && (pick.how.empty() || pick.how == "done");
+  verdict.taken = pick.grip && pick.grip->kind == GripResult::Kind::Taken;
+  verdict.right = pick.nearest && pick.grip && (pick.how.empty() || pick.how == (verdict.taken ? "done" : "FAILED"));
   std::string& line = verdict.line;
   if (pick.result) {
     add(line, "sequence %u", pick.result->sequence);
@@ -40,7 +41,7 @@ PickVerdict judge(const PickSeen& pick, double tolerance_mm, double tolerance_de
     const double deg = Angle::rad(pick.nearest->error.angle_rad).in_deg();
     add(line, "error %.1f mm %.1f deg", mm, deg);
     if (mm > tolerance_mm || deg > tolerance_deg) {
-      verdict.good = false;
+      verdict.right = false;
       line += " (TOO FAR OFF)";
     }
   } else {
@@ -52,10 +53,11 @@ PickVerdict judge(const PickSeen& pick, double tolerance_mm, double tolerance_de
     if (pick.result &&
         (pick.result->T_base_grasp.iso.translation() - pick.read->T_base_grasp.iso.translation()).norm() >
             kSamePoseMm) {
-      verdict.good = false;
+      verdict.right = false;
       line += " (NOT WHAT THE PLC READ)";
     }
   }
+  if (pick.grip) add(line, "%s", to_string(*pick.grip).c_str());
   if (!pick.how.empty()) add(line, "%s", pick.how.c_str());
   return verdict;
 }

@@ -1,5 +1,6 @@
 #include "tests/emulators/program/run.hpp"
 
+#include <cmath>
 #include <csignal>
 #include <cstdarg>
 #include <cstdio>
@@ -102,8 +103,7 @@ void Run::open_devices() {
                                       : daemon_at(config_.pose_listen, options_.daemon_host, "robot.pose_listen"),
           [this](TimePoint at) { return robot_->device.flange_at(at); }, options_.bin.seed);
     robot_->device.on_grasp = [this](const drivers::robot::Pick& pick) {
-      picks_[pick.pick_id].nearest = bin_.nearest(pick.T_base_grasp);
-      return bin_.take(pick.T_base_grasp);
+      return close_gripper(picks_[pick.pick_id], pick.T_base_approach, pick.T_base_grasp);
     };
   }
   if (options_.devices.contains(Device::Plc)) {
@@ -239,8 +239,7 @@ void Run::turn_plc(TimePoint now) {
       } else if (now - step_since_ >= options_.pick_time) {
         // A real robot took it meanwhile; the emulated bin follows.
         Pick& pick = picks_[picking_];
-        pick.nearest = bin_.nearest(pick.result->T_base_grasp);
-        bin_.take(pick.result->T_base_grasp);
+        close_gripper(pick, pick.result->T_base_approach, pick.result->T_base_grasp);
         plc.set_robot_clear(true);
         finish_pick(picking_, "", now);
       }
@@ -288,6 +287,13 @@ void Run::turn_robot(TimePoint now) {
   }
 }
 
+bool Run::close_gripper(Pick& pick, const Transform<frame::Base, frame::Tcp>& T_base_approach,
+                        const Transform<frame::Base, frame::Tcp>& T_base_grasp) {
+  pick.nearest = bin_.nearest(T_base_grasp);
+  pick.grip = bin_.take(T_base_approach, T_base_grasp);
+  return pick.grip->kind == GripResult::Kind::Taken;
+}
+
 void Run::finish_pick(std::uint16_t pick_id, const std::string& how, TimePoint now) {
   const Pick pick = picks_[pick_id];
   picks_.erase(pick_id);
@@ -295,17 +301,26 @@ void Run::finish_pick(std::uint16_t pick_id, const std::string& how, TimePoint n
   if (ours) step_ = Step::Idle;
   next_request_ = now + options_.pause;
   ++done_;
-  const PickVerdict verdict = judge({.result = pick.result, .read = pick.read, .nearest = pick.nearest, .how = how},
-                                    options_.tolerance_mm, options_.tolerance_deg);
-  if (verdict.good) ++good_;
+  const PickVerdict verdict =
+      judge({.result = pick.result, .read = pick.read, .nearest = pick.nearest, .grip = pick.grip, .how = how},
+            options_.tolerance_mm, options_.tolerance_deg);
+  if (verdict.right) ++right_;
+  if (verdict.taken) ++taken_;
   if (pick.nearest) {
     worst_mm_ = std::max(worst_mm_, pick.nearest->error.centroid_mm);
     worst_deg_ = std::max(worst_deg_, Angle::rad(pick.nearest->error.angle_rad).in_deg());
   }
   say("pick %d: %s, %zu left in the bin", done_, verdict.line.c_str(), bin_.objects_left());
-  if (options_.cycles > 0 && done_ >= options_.cycles)
-    return finish(good_ == done_ ? 0 : 1, good_ == done_ ? "all picks good" : "not all picks were good");
+  if (options_.cycles > 0 && done_ >= options_.cycles) return finish_as_counted();
   refill_when_low();
+}
+
+void Run::finish_as_counted() {
+  const int failed = done_ - taken_, allowed = static_cast<int>(std::ceil(options_.failed_grips * done_));
+  if (right_ < done_) return finish(1, "not all picks were good");
+  if (failed == 0) return finish(0, "all picks good");
+  finish(failed <= allowed ? 0 : 1, "all poses right, but the gripper failed at " + std::to_string(failed) + ", " +
+                                        std::to_string(allowed) + " allowed");
 }
 
 void Run::refill_when_low() {
@@ -440,10 +455,10 @@ std::string Run::summary() const {
   char text[256];
   std::snprintf(
       text, sizeof text,
-      "%d picks, %d good (within %.1f mm and %.1f deg; worst %.1f mm, %.1f deg), %d answers without a pick, bin "
-      "filled anew %d times, %zu objects left",
-      done_, good_, options_.tolerance_mm, options_.tolerance_deg, worst_mm_, worst_deg_, without_pick_, refills_,
-      bin_.objects_left());
+      "%d picks, %d right (within %.1f mm and %.1f deg; worst %.1f mm, %.1f deg), %d taken, %d answers without a pick, "
+      "bin filled anew %d times, %zu objects left",
+      done_, right_, options_.tolerance_mm, options_.tolerance_deg, worst_mm_, worst_deg_, taken_, without_pick_,
+      refills_, bin_.objects_left());
   return text;
 }
 

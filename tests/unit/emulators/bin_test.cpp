@@ -68,16 +68,45 @@ TEST_F(EmulatedBin, TellsHowFarAPickIsOff) {
   EXPECT_NEAR(Angle::rad(bin.nearest(grasp_of(object, turn(125)))->error.angle_rad).in_deg(), 5, 0.1);
 }
 
-TEST_F(EmulatedBin, TheGripperTakesWhatIsBetweenItsJaws) {
-  Bin bin{*config_, {.objects = 3, .seed = 3}};
+TEST_F(EmulatedBin, WithoutAGripperWhatIsNearIsTaken) {
+  config::Config config = *config_;
+  config.recipes[0].part.gripper.reset();
+  Bin bin{config, {.objects = 3, .seed = 3}};
   const World::Object object = bin.world().objects().front();
-  EXPECT_FALSE(bin.take(grasp_of(object, shift(400))));
-  EXPECT_FALSE(bin.take(grasp_of(object, turn(15))));
+  const auto take = [&](const Eigen::Isometry3d& moved) {
+    const auto T = grasp_of(object, moved);
+    return bin.take(T, T).kind;
+  };
+  EXPECT_EQ(take(shift(400)), GripResult::Kind::Missed);
+  EXPECT_EQ(take(turn(15)), GripResult::Kind::Missed);
   EXPECT_EQ(bin.objects_left(), 3U);
-  EXPECT_TRUE(bin.take(grasp_of(object, shift(10))));
+  EXPECT_EQ(take(shift(10)), GripResult::Kind::Taken);
   EXPECT_EQ(bin.objects_left(), 2U);
   EXPECT_EQ(bin.world().find(object.id), nullptr);
-  EXPECT_FALSE(bin.take(grasp_of(object, Eigen::Isometry3d::Identity()))) << "it is gone";
+  EXPECT_EQ(take(Eigen::Isometry3d::Identity()), GripResult::Kind::Missed) << "it is gone";
+}
+
+TEST_F(EmulatedBin, TheGripperTakesWhatItsJawsEnclose) {
+  Bin bin{*config_, {.objects = 1, .seed = 3}};
+  const World::Object object = bin.world().objects().front();
+  const Transform<frame::Base, frame::Object> T_base_object =
+      config_->supplies[0].T_base_supply * object.T_supply_object;
+  const auto& grasps = config_->recipes[0].part.grasps;
+  const auto from_above = [&](const vision::Grasp& grasp) {
+    return (T_base_object * grasp.T_object_tcp).iso.linear()(2, 2) < -0.9;
+  };
+  const auto grasp = std::ranges::find_if(grasps, from_above);
+  ASSERT_NE(grasp, grasps.end());
+  const auto take = [&](double across_mm) {
+    const Transform<frame::Base, frame::Tcp> T{(T_base_object * grasp->T_object_tcp).iso *
+                                               Eigen::Translation3d{across_mm, 0, 0}};
+    return bin.take({T.iso * Eigen::Translation3d{0, 0, -grasp->approach_mm}}, T).kind;
+  };
+  EXPECT_EQ(take(20), GripResult::Kind::Collision) << grasp->name << ": a jaw on the rim";
+  EXPECT_EQ(take(70), GripResult::Kind::Missed) << grasp->name << ": the rim is beside both jaws";
+  EXPECT_EQ(bin.objects_left(), 1U) << "it stays where it is";
+  EXPECT_EQ(take(3), GripResult::Kind::Taken) << grasp->name;
+  EXPECT_EQ(bin.objects_left(), 0U);
 }
 
 TEST_F(EmulatedBin, IsEmptiedFromAboveAndFilledAnew) {
@@ -113,22 +142,33 @@ TEST(PickLine, GivesTheFiguresAndTheVerdict) {
   read.T_base_grasp = result.T_base_grasp;
   seen.read = read;
   seen.nearest = Bin::Nearest{1, {1.26, Angle::deg(0.83).in_rad()}};
+  seen.grip = GripResult{.kind = GripResult::Kind::Taken, .object = 1, .what = ""};
   seen.how = "done";
-  EXPECT_TRUE(judge(seen, 5, 3).good);
+  EXPECT_TRUE(judge(seen, 5, 3).right);
   EXPECT_EQ(
       judge(seen, 5, 3).line,
       "sequence 3, sweep 1.02 s, 367 profiles, 58310 points, 512 hypotheses, detection 143 ms, error 1.3 mm 0.8 deg, "
-      "robot read pick 7 at (1.2034 -0.1021 0.1534) m, done");
-  EXPECT_FALSE(judge(seen, 1, 3).good);
-  EXPECT_FALSE(judge(seen, 5, 0.5).good);
+      "robot read pick 7 at (1.2034 -0.1021 0.1534) m, taken, done");
+  EXPECT_FALSE(judge(seen, 1, 3).right);
+  EXPECT_FALSE(judge(seen, 5, 0.5).right);
   seen.how = "FAILED";
-  EXPECT_FALSE(judge(seen, 5, 3).good);
+  EXPECT_FALSE(judge(seen, 5, 3).right);
   seen.how = "done";
+  seen.grip->kind = GripResult::Kind::Missed;
+  seen.grip->what = "nothing between the jaws";
+  EXPECT_FALSE(judge(seen, 5, 3).right) << "the robot says that it holds what it does not";
+  seen.how = "FAILED";
+  EXPECT_TRUE(judge(seen, 5, 3).right) << "a right pose, at which the grip failed";
+  EXPECT_FALSE(judge(seen, 5, 3).taken);
+  EXPECT_NE(judge(seen, 5, 3).line.find("missed: nothing between the jaws"), std::string::npos);
+  seen.grip->kind = GripResult::Kind::Taken;
+  seen.how = "done";
+  EXPECT_TRUE(judge(seen, 5, 3).taken);
   seen.read->T_base_grasp.iso.translation().x() += 0.2;
-  EXPECT_FALSE(judge(seen, 5, 3).good) << "PLC and robot were told different things";
+  EXPECT_FALSE(judge(seen, 5, 3).right) << "PLC and robot were told different things";
   seen.read.reset();
-  EXPECT_TRUE(judge(seen, 5, 3).good) << "a robot that is not played here is not judged";
+  EXPECT_TRUE(judge(seen, 5, 3).right) << "a robot that is not played here is not judged";
   seen.nearest.reset();
-  EXPECT_FALSE(judge(seen, 5, 3).good);
+  EXPECT_FALSE(judge(seen, 5, 3).right);
 }
 }  // namespace binpick::emulators
