@@ -1,16 +1,54 @@
 #include <algorithm>
+#include <array>
+#include <filesystem>
 #include <fstream>
 #include <gtest/gtest.h>
+#include <poll.h>
 #include <signal.h>
+#include <sys/inotify.h>
+#include <thread>
+#include <unistd.h>
 
+#include "daemon/cycle/record_codec.hpp"
 #include "tests/emulators/program/scan_paths.hpp"
 #include "tests/support/scenes.hpp"
 #include "tests/system/system_cell.hpp"
+#include "tests/unit/daemon/own_folder.hpp"
 
 /// The real daemon over real sockets: what memory and virtual time cannot show.
 namespace binpick::support {
 namespace {
 using namespace std::chrono_literals;
+namespace fs = std::filesystem;
+
+/// Kills the daemon as soon as a file that it has made in the folder holds something: it writes then.
+class KillInTheWrite {
+ public:
+  KillInTheWrite(const std::string& folder, const SystemCell& cell)
+      : events_{inotify_init1(IN_CLOEXEC)}, thread_{[this, folder, &cell](const std::stop_token& stop) {
+          inotify_add_watch(events_, folder.c_str(), IN_CREATE);
+          for (std::array<char, 4096> news{}; !stop.stop_requested();) {
+            pollfd created{events_, POLLIN, 0};
+            if (poll(&created, 1, 20) < 1 || read(events_, news.data(), news.size()) <= 0) continue;
+            const auto* event = reinterpret_cast<const inotify_event*>(news.data());
+            const std::string path = folder + "/" + static_cast<const char*>(event->name);
+            std::error_code gone;
+            while (fs::file_size(path, gone) == 0 && !gone) continue;
+            cell.signal(SIGKILL);
+            return;
+          }
+        }} {}
+  ~KillInTheWrite() {
+    thread_ = {};  // stops and joins
+    close(events_);
+  }
+  KillInTheWrite(const KillInTheWrite&) = delete;
+  KillInTheWrite& operator=(const KillInTheWrite&) = delete;
+
+ private:
+  int events_;
+  std::jthread thread_;
+};
 
 /// Sweeping: the pivot has left the start and profiles are collected.
 bool reach_sweep(SystemCell& cell) {
@@ -170,6 +208,68 @@ TEST(Daemon, ReloadsWhileCyclesRun) {
   cell.plc().raise_reset();
   EXPECT_TRUE(cell.run_until(
       [&] { return std::ranges::count(cell.plc().alarms(), plc::Alarm::ConfigurationRefused) == 0; }, 2s));
+}
+
+TEST(Daemon, KilledInTheWriteOfARecordReplayTellsItInOneLine) {
+  CellFile file = coarse_cell();
+  file.frequency_hz = 360;
+  file.resolution_deg = 0.1;
+  file.sweep_speed_deg_s = 8;  // some megabytes: a write that a kill can hit
+  // Memory is written page by page, a disk in steps of megabytes.
+  const daemon::OwnFolder folder{daemon::folder_in_memory()};
+  file.record_dir = folder.path("records");
+  fs::create_directory(file.record_dir);
+  const auto cut_off = [&] {
+    for (const auto& entry : fs::directory_iterator{file.record_dir})
+      if (entry.path().filename().string().find(".part") != std::string::npos) return entry.path();
+    return fs::path{};
+  };
+  SystemCell cell{file, scene_of("track_link", 3, 2)};
+  const auto start_again = [&] {
+    const auto boot = cell.plc().boot_count();
+    cell.start_daemon();
+    return cell.run_until([&] { return cell.plc().boot_count() != boot; }) && cell.run_until_ready() &&
+           cell.run_until([&] { return cell.robot().clear_of_view(); });
+  };
+  ASSERT_TRUE(cell.run_until_ready());
+  // The kill may come after the last byte: then once more.
+  std::string left_over;
+  for (int attempt = 0; attempt < 10 && left_over.empty(); ++attempt) {
+    if (attempt > 0) {
+      ASSERT_TRUE(start_again());
+    }
+    {
+      const KillInTheWrite killer{file.record_dir, cell};
+      cell.plc().raise_request(1, 1);
+      ASSERT_TRUE(cell.run_until([&] { return cell.exit_status().has_value(); }, 20s));
+    }
+    ASSERT_EQ(cell.exit_status(), 128 + SIGKILL);
+    const fs::path left = cut_off();
+    if (left.empty()) continue;
+    if (daemon::read_record(left)) {
+      fs::remove(left);
+    } else {
+      left_over = left;
+    }
+  }
+  ASSERT_FALSE(left_over.empty()) << "no kill came while it wrote";
+  EXPECT_GT(fs::file_size(left_over), 0U);
+  std::printf("%ju bytes were written\n", static_cast<std::uintmax_t>(fs::file_size(left_over)));
+
+  // The next start works on beside it, and what both left is replayed.
+  ASSERT_TRUE(start_again());
+  const auto result = cell.pick();
+  ASSERT_TRUE(result.has_value());
+  EXPECT_EQ(result->code, plc::ResultCode::PickFound);
+  cell.signal(SIGTERM);
+  ASSERT_TRUE(cell.run_until([&] { return cell.exit_status().has_value(); }, 3s));
+  EXPECT_EQ(cell.exit_status(), 0);
+  const Ended replay = run_program(BINPICK_PROGRAM, {"replay", file.record_dir});
+  EXPECT_EQ(replay.status, 0) << replay.errors;
+  EXPECT_NE(replay.output.find(" identical, 0 differ, 1 skipped"), std::string::npos) << replay.output;
+  EXPECT_EQ(replay.output.find(" 0 identical"), std::string::npos) << replay.output;
+  EXPECT_EQ(std::ranges::count(replay.errors, '\n'), 1) << replay.errors;
+  EXPECT_TRUE(replay.errors.starts_with("binpick replay: skipped: " + left_over + " is cut off")) << replay.errors;
 }
 
 TEST(Daemon, RefusesABadFileAtTheStart) {
