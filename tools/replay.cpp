@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -69,13 +70,59 @@ std::string summary_of(const daemon::DetectResult& result) {
          " reachable";
 }
 
-enum class Outcome { Identical, Differs, NothingToCompare, Skipped };
+enum class Outcome {
+  Identical,
+  Differs,
+  CutShort,     ///< By detection.deadline_ms then; a replay takes its time and may well find more.
+  WithoutThen,  ///< The cycle ended without a result.
+  Skipped,
+};
 
-/// One record; adds to `list` what it came to.
-Outcome replay_one(const std::string& file, const ReplayOrder& order, nlohmann::json& list) {
+/// What came of all records.
+struct Replays {
+  std::map<Outcome, std::size_t> counts;
+  nlohmann::json list = nlohmann::json::array();
+  bool drawn = true;  ///< The picture that was asked for.
+};
+
+const char* name_of(Outcome outcome) {
+  switch (outcome) {
+    case Outcome::Identical:
+      return "identical";
+    case Outcome::Differs:
+      return "differs";
+    case Outcome::CutShort:
+      return "cut short by its deadline then, with more time";
+    case Outcome::WithoutThen:
+      return "ended without a result then";
+    case Outcome::Skipped:
+      break;
+  }
+  return "skipped";
+}
+
+Outcome outcome_of(const std::optional<daemon::DetectResult>& then, bool same) {
+  if (!then) return Outcome::WithoutThen;
+  if (same) return Outcome::Identical;
+  return then->report.cut_short ? Outcome::CutShort : Outcome::Differs;
+}
+
+nlohmann::json choice_to_json(const vision::GraspChoice& choice, const std::vector<vision::Grasp>& grasps) {
+  nlohmann::json reachable = nlohmann::json::array(), unreachable = nlohmann::json::array();
+  for (const auto& one : choice.reachable)
+    reachable.push_back({{"detection", one.detection},
+                         {"grasp", grasps[one.grasp].name},
+                         {"T_supply_grasp", rows_of(one.T_supply_grasp.iso.matrix())},
+                         {"T_supply_approach", rows_of(one.T_supply_approach.iso.matrix())}});
+  for (const auto& one : choice.unreachable)
+    unreachable.push_back({{"detection", one.detection}, {"reason", one.reason}});
+  return {{"reachable", reachable}, {"unreachable", unreachable}};
+}
+
+Outcome replay_one(const std::string& file, const ReplayOrder& order, Replays& all) {
   const auto skip = [&](const std::string& why) {
     std::fprintf(stderr, "binpick replay: skipped: %s\n", why.c_str());
-    list.push_back({{"file", file}, {"skipped", why}});
+    all.list.push_back({{"file", file}, {"skipped", why}});
     return Outcome::Skipped;
   };
   const auto record = daemon::read_record(file);
@@ -86,39 +133,45 @@ Outcome replay_one(const std::string& file, const ReplayOrder& order, nlohmann::
   if (!replayed) return skip(file + " " + replayed.error());
   const daemon::DetectResult& now = replayed->result;
   const auto& base = replayed->request.cell->knowledge_bases[replayed->request.recipe];
+  const auto& part = replayed->request.cell->config.recipes[replayed->request.recipe].part;
 
   const auto lines = record->result ? daemon::differences(*record->result, now) : std::vector<std::string>{};
-  const bool cut_short = record->result && record->result->report.cut_short;
-  const Outcome outcome = !record->result ? Outcome::NothingToCompare
-                          : lines.empty() ? Outcome::Identical
-                                          : Outcome::Differs;
+  const Outcome outcome = outcome_of(record->result, lines.empty());
   nlohmann::json entry = to_json(base.part_name(), now.report);
   entry["file"] = file;
   entry["cycle"] = record->origin.cycle_id;
   entry["boot_count"] = record->origin.boot_count;
   entry["binpick"] = record->origin.version;
   entry["loops"] = now.loops;
-  entry["cut_short"] = cut_short;
+  entry["cut_short"] = record->result && record->result->report.cut_short;
   entry["identical"] = outcome == Outcome::Identical;
   entry["differences"] = lines;
-  list.push_back(entry);
+  entry.update(choice_to_json(now.choice, part.grasps));
+  all.list.push_back(entry);
 
   if (order.json != "-") {
-    const char* verdict = outcome == Outcome::Identical ? "identical"
-                          : outcome == Outcome::Differs ? "differs"
-                                                        : "ended without a result then";
-    std::printf("%s: cycle %llu of start %u: %s; %s (%s loops, %.0f ms)\n", file.c_str(),
-                static_cast<unsigned long long>(record->origin.cycle_id), record->origin.boot_count, verdict,
+    std::printf("%s: cycle %llu of start %u: %s: %s (%s loops, %.0f ms)\n", file.c_str(),
+                static_cast<unsigned long long>(record->origin.cycle_id), record->origin.boot_count, name_of(outcome),
                 summary_of(now).c_str(), now.loops.c_str(), now.report.time_ms);
     for (const auto& line : lines) std::printf("  %s\n", line.c_str());
-    if (cut_short) std::printf("  the recorded result was cut short by its deadline; this one took its time\n");
   }
   if (!order.image.empty()) {
     const auto* chosen = now.choice.reachable.empty() ? nullptr : &now.choice.reachable.front();
-    if (const auto drawn = vision::draw_report(order.image, replayed->request.image, base, now.report, chosen); !drawn)
-      complain(1, drawn.error());
+    const auto drawn = vision::draw_report(order.image, replayed->request.image, base, now.report, chosen,
+                                           part.gripper ? &*part.gripper : nullptr,
+                                           chosen != nullptr ? &part.grasps[chosen->grasp] : nullptr);
+    if (!drawn) complain(1, drawn.error());
+    all.drawn = drawn.has_value();
   }
   return outcome;
+}
+
+void tell(std::map<Outcome, std::size_t>& counts, std::size_t files) {
+  std::printf("%zu records: %zu identical, %zu differ, %zu skipped", files, counts[Outcome::Identical],
+              counts[Outcome::Differs], counts[Outcome::Skipped]);
+  if (counts[Outcome::CutShort] > 0) std::printf(", %zu cut short by their deadline then", counts[Outcome::CutShort]);
+  if (counts[Outcome::WithoutThen] > 0) std::printf(", %zu without a result then", counts[Outcome::WithoutThen]);
+  std::printf("\n");
 }
 
 int run(const ReplayOrder& order) {
@@ -128,27 +181,20 @@ int run(const ReplayOrder& order) {
   for (const std::string& path : {order.image, order.json == "-" ? std::string{} : order.json})
     if (const auto trouble = path.empty() ? path : cannot_be_written(path); !trouble.empty())
       return complain(1, trouble);
-  nlohmann::json list = nlohmann::json::array();
-  std::size_t identical = 0, differ = 0, skipped = 0;
-  for (const auto& file : files) {
-    const Outcome outcome = replay_one(file, order, list);
-    identical += outcome == Outcome::Identical ? 1 : 0;
-    differ += outcome == Outcome::Differs ? 1 : 0;
-    skipped += outcome == Outcome::Skipped ? 1 : 0;
-  }
+  Replays all;
+  for (const auto& file : files) ++all.counts[replay_one(file, order, all)];
   if (order.json == "-") {
-    std::printf("%s\n", list.dump(2).c_str());
+    std::printf("%s\n", all.list.dump(2).c_str());
   } else {
     if (!order.json.empty()) {
       std::ofstream out{order.json};
-      out << list.dump(2) << '\n';
+      out << all.list.dump(2) << '\n';
       if (!out.flush()) return complain(1, order.json + ": cannot be written; check that the folder has room");
     }
-    if (files.size() > 1)
-      std::printf("%zu records: %zu identical, %zu differ, %zu skipped\n", files.size(), identical, differ, skipped);
+    if (files.size() > 1) tell(all.counts, files.size());
   }
-  if (skipped == files.size()) return 1;
-  return differ > 0 && !order.changed() ? 1 : 0;
+  if (all.counts[Outcome::Skipped] == files.size() || !all.drawn) return 1;
+  return all.counts[Outcome::Differs] > 0 && !order.changed() ? 1 : 0;
 }
 }  // namespace
 

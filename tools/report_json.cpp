@@ -1,7 +1,6 @@
 #include "tools/report_json.hpp"
 
 namespace binpick::tools {
-namespace {
 nlohmann::json rows_of(const Eigen::MatrixXd& matrix) {
   nlohmann::json rows = nlohmann::json::array();
   for (Eigen::Index r = 0; r < matrix.rows(); ++r) {
@@ -12,6 +11,7 @@ nlohmann::json rows_of(const Eigen::MatrixXd& matrix) {
   return rows;
 }
 
+namespace {
 nlohmann::json to_json(const vision::Evidence& evidence) {
   nlohmann::json json;
   for (std::size_t k = 0; k < vision::kClueNames.size(); ++k)
