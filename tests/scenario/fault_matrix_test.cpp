@@ -1,12 +1,11 @@
 #include <algorithm>
 #include <cstdio>
-#include <functional>
 #include <gtest/gtest.h>
 #include <string>
-#include <vector>
 
 #include "plc/alarms.hpp"
 #include "tests/support/cell_file.hpp"
+#include "tests/support/device_faults.hpp"
 #include "tests/support/emulated_cell.hpp"
 #include "tests/support/scenes.hpp"
 
@@ -16,88 +15,16 @@ namespace binpick::support {
 namespace {
 using namespace std::chrono_literals;
 
-enum class Phase { Ready, Positioning, Sweeping, Detecting, ResultPending };
-constexpr Phase kPhases[] = {Phase::Ready, Phase::Positioning, Phase::Sweeping, Phase::Detecting, Phase::ResultPending};
+constexpr CyclePhase kPhases[] = {CyclePhase::Ready, CyclePhase::Positioning, CyclePhase::Sweeping,
+                                  CyclePhase::Detecting, CyclePhase::ResultPending};
 
-const char* to_text(Phase phase) {
-  switch (phase) {
-    case Phase::Ready:
-      return "ready";
-    case Phase::Positioning:
-      return "positioning";
-    case Phase::Sweeping:
-      return "sweeping";
-    case Phase::Detecting:
-      return "detecting";
-    case Phase::ResultPending:
-      return "result pending";
-  }
-  return "?";
-}
-
-struct Case {
-  std::string device, fault;
-  std::function<void(EmulatedCell&, bool on)> set;
-};
-
-std::vector<Case> cases() {
-  using emulators::Faults;
-  const auto of = [](auto member, auto change) {
-    return [member, change](EmulatedCell& cell, bool on) {
-      Faults healthy;
-      if (on) change(healthy);
-      (cell.*member).faults = healthy;
-    };
-  };
-  const auto unplugged = [](Faults& f) { f.unplugged = true; };
-  const auto silent = [](Faults& f) { f.silent = true; };
-  const auto garbage = [](Faults& f) { f.garbage = true; };
-  const auto emergency_stop = [](Faults& f) { f.emergency_stop = true; };
-  const auto bus_off = [](Faults& f) { f.bus_off = true; };
-  const auto error = [](std::uint32_t code) { return [code](Faults& f) { f.error_code = code; }; };
-  const auto wrong_id = [](Faults& f) { f.wrong_id = true; };
-  return {
-      {"pivot", "pulled", of(&EmulatedCell::pivot, unplugged)},
-      {"pivot", "silent", of(&EmulatedCell::pivot, silent)},
-      {"pivot", "garbled", of(&EmulatedCell::pivot, garbage)},
-      {"pivot", "wrong id", of(&EmulatedCell::pivot, wrong_id)},
-      {"pivot", "tow error", of(&EmulatedCell::pivot, error(0x11))},
-      {"pivot", "emergency stop", of(&EmulatedCell::pivot, emergency_stop)},
-      {"pivot", "bus-off", of(&EmulatedCell::pivot, bus_off)},
-      {"scanner", "pulled", of(&EmulatedCell::scanner, unplugged)},
-      {"scanner", "silent", of(&EmulatedCell::scanner, silent)},
-      {"scanner", "garbled", of(&EmulatedCell::scanner, garbage)},
-      {"scanner", "sFA 6", of(&EmulatedCell::scanner, error(6))},
-      {"robot", "pulled", of(&EmulatedCell::robot, unplugged)},
-      {"robot", "silent", of(&EmulatedCell::robot, silent)},
-      {"robot", "garbled", of(&EmulatedCell::robot, garbage)},
-      {"robot", "emergency stop", of(&EmulatedCell::robot, emergency_stop)},
-      {"plc", "pulled", of(&EmulatedCell::plc, unplugged)},
-      {"plc", "silent", of(&EmulatedCell::plc, silent)},
-      {"plc", "garbled", of(&EmulatedCell::plc, garbage)},
-      {"plc", "in STOP", of(&EmulatedCell::plc, error(1))},
-  };
-}
-
-bool reach(EmulatedCell& cell, Phase phase) {
-  if (phase == Phase::Ready) return true;
-  cell.plc.hold_ack = phase == Phase::ResultPending;
+bool comes_to(EmulatedCell& cell, CyclePhase phase) {
+  if (phase == CyclePhase::Ready) return true;
+  cell.plc.hold_ack = phase == CyclePhase::ResultPending;
   cell.plc.raise_request(1, 1);
-  switch (phase) {
-    case Phase::Ready:
-      return true;
-    case Phase::Positioning:
-      return cell.run_until(
-          [&] { return cell.cell().state() == daemon::CellState::Sweeping && cell.pivot.moving(cell.now()); });
-    case Phase::Sweeping:
-      return cell.run_until([&] { return cell.cell().sweep_state() == drivers::sweep::State::Sweeping; }) &&
-             (cell.run_for(400ms), true);
-    case Phase::Detecting:
-      return cell.run_until([&] { return cell.cell().state() == daemon::CellState::Detecting; });
-    case Phase::ResultPending:
-      return cell.run_until([&] { return cell.plc.result_valid(); });
-  }
-  return false;
+  if (!reach(cell, phase)) return false;
+  if (phase == CyclePhase::Sweeping) cell.run_for(400ms);
+  return phase != CyclePhase::ResultPending || cell.run_until([&] { return cell.plc.result_valid(); });
 }
 
 struct Outcome {
@@ -106,11 +33,11 @@ struct Outcome {
   double ready_after_s = 0;
 };
 
-Outcome play(const Case& c, Phase phase) {
+Outcome play(const DeviceFault& c, CyclePhase phase) {
   Outcome outcome;
   EmulatedCell cell{test_folder().load(coarse_cell()), scene_of("track_link", 2, 5), 5};
   cell.detection_time = 1500ms;  // long enough for a fault in it to be noticed
-  if (!cell.run_until_ready() || !reach(cell, phase)) {
+  if (!cell.run_until_ready() || !comes_to(cell, phase)) {
     ADD_FAILURE() << "the cell did not come to " << to_text(phase);
     return outcome;
   }
@@ -145,11 +72,11 @@ Outcome play(const Case& c, Phase phase) {
 TEST(FaultMatrix, EveryDeviceEveryFaultEveryPhase) {
   std::printf("%-8s %-15s %-15s %-12s %-6s %-21s %-10s %s\n", "device", "fault", "phase", "alarms", "pivot",
               "valid meanwhile", "ready in s", "next pick");
-  for (const auto& c : cases())
-    for (const Phase phase : kPhases) {
-      SCOPED_TRACE(c.device + ", " + c.fault + ", " + to_text(phase));
+  for (const DeviceFault& c : standing_faults())
+    for (const CyclePhase phase : kPhases) {
+      SCOPED_TRACE(c.device + ", " + c.name + ", " + to_text(phase));
       const Outcome o = play(c, phase);
-      std::printf("%-8s %-15s %-15s %-12s %-6s %-21s %-10.2f %s\n", c.device.c_str(), c.fault.c_str(), to_text(phase),
+      std::printf("%-8s %-15s %-15s %-12s %-6s %-21s %-10.2f %s\n", c.device.c_str(), c.name.c_str(), to_text(phase),
                   o.alarm.c_str(), o.pivot_stands ? "stands" : "MOVES", o.valid.c_str(), o.ready_after_s,
                   o.next_pick ? "found" : "NONE");
       EXPECT_TRUE(o.pivot_stands);
@@ -159,7 +86,7 @@ TEST(FaultMatrix, EveryDeviceEveryFaultEveryPhase) {
       EXPECT_TRUE(o.next_pick);
       EXPECT_NE(o.alarm, "–");
       // A result that was complete before the fault stays until it is acknowledged.
-      if (phase != Phase::ResultPending && c.device != "robot" && c.device != "plc") {
+      if (phase != CyclePhase::ResultPending && c.device != "robot" && c.device != "plc") {
         EXPECT_EQ(o.valid, "nothing");
       }
     }
