@@ -8,8 +8,12 @@
 #include <functional>
 #include <map>
 
+#include "plc/alarms.hpp"
+
 namespace binpick::bench {
 namespace {
+const std::string kNotLocated = "alarm " + std::to_string(static_cast<int>(plc::Alarm::SupplyNotFound));
+
 [[gnu::format(printf, 1, 2)]] std::string text(const char* format, ...) {
   std::array<char, 240> line{};
   std::va_list arguments;
@@ -38,7 +42,7 @@ Spread spread(std::vector<double> values) {
 ProductionFigures figures_of(const std::string& name, const std::vector<PartRun>& runs, const RobotModel& robot) {
   ProductionFigures f;
   f.name = name;
-  std::vector<double> cycles, without, mm, deg;
+  std::vector<double> cycles, without, mm, deg, place_mm, place_deg;
   for (const PartRun& run : runs) {
     std::map<std::uint64_t, int> takeable;
     for (const BinRecord& bin : run.bins) {
@@ -60,6 +64,11 @@ ProductionFigures figures_of(const std::string& name, const std::vector<PartRun>
           f.first_hypotheses.push_back(static_cast<double>(r.first_hypotheses));
         }
       }
+      if (r.place_mm > 0) {
+        place_mm.push_back(r.place_mm);
+        place_deg.push_back(r.place_deg);
+      }
+      f.not_located += r.answer == kNotLocated;
       f.available += r.answer == "pick" || (r.answer == "empty" && r.left_before == 0);
       f.truly_unreachable += r.answer == "not_reachable" && takeable[r.bin] == 0;
       if (r.answer != "pick") continue;
@@ -71,6 +80,7 @@ ProductionFigures figures_of(const std::string& name, const std::vector<PartRun>
       f.retries += r.retry;
       mm.push_back(r.error_mm);
       deg.push_back(r.error_deg);
+      if (r.fault) continue;  // its time is of the fault
       cycles.push_back(std::max(r.scan_s, robot.place_s) + r.robot_s);
       without.push_back(r.scan_s + r.robot_s + robot.place_s);
     }
@@ -79,6 +89,8 @@ ProductionFigures figures_of(const std::string& name, const std::vector<PartRun>
   f.cycle_without_overlap_s = spread(std::move(without));
   f.error_mm = spread(std::move(mm));
   f.error_deg = spread(std::move(deg));
+  f.place_mm = spread(std::move(place_mm));
+  f.place_deg = spread(std::move(place_deg));
   return f;
 }
 
@@ -123,6 +135,12 @@ std::string to_table(const std::vector<ProductionFigures>& parts, const Producti
   row("picks per scan", [](F f) { return text("%.2f", f.picks_per_scan()); });
   row("pose error mm p50 / p95", [](F f) { return text("%.2f / %.2f", f.error_mm.p50, f.error_mm.p95); });
   row("pose error deg p50 / p95", [](F f) { return text("%.2f / %.2f", f.error_deg.p50, f.error_deg.p95); });
+  if (all.place_mm.p95 > 0) {
+    row("supply located: error mm p50 / p95", [](F f) { return text("%.2f / %.2f", f.place_mm.p50, f.place_mm.p95); });
+    row("supply located: error deg p50 / p95",
+        [](F f) { return text("%.2f / %.2f", f.place_deg.p50, f.place_deg.p95); });
+    row("scans in which it was not", [](F f) { return text("%d", f.not_located); });
+  }
   row("cycle s p50 / p95, overlapped", [](F f) { return text("%.1f / %.1f", f.cycle_s.p50, f.cycle_s.p95); });
   row("cycle s p50 / p95, without overlap",
       [](F f) { return text("%.1f / %.1f", f.cycle_without_overlap_s.p50, f.cycle_without_overlap_s.p95); });

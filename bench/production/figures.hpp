@@ -30,6 +30,8 @@ struct ProductionFigures {
   double cpu_s = 0;
   Spread cycle_s, cycle_without_overlap_s;  ///< Of picks: from one to the next.
   Spread error_mm, error_deg;
+  int not_located = 0;         ///< Scans in which the supply was not found.
+  Spread place_mm, place_deg;  ///< Of a supply that was located.
   std::vector<double> detection_ms, hypotheses, first_ms, first_hypotheses;  ///< Of scans.
 
   double share(int count) const { return picks > 0 ? 100.0 * count / picks : 0; }

@@ -4,11 +4,13 @@
 #include <exception>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "base/log.hpp"
 #include "bench/production/bin_run.hpp"
+#include "bench/production/fault_figures.hpp"
 #include "bench/production/figures.hpp"
 #include "bench/production/picture.hpp"
 #include "bench/production/setup.hpp"
@@ -17,6 +19,8 @@
 /// Empties bin after bin with the whole cell in virtual time, thousands of picks, and says what came of it.
 namespace binpick::bench {
 namespace {
+constexpr double kDisplaced_mm = 80;
+
 struct Arguments {
   int picks = 3000;
   std::uint64_t seed = 1;
@@ -24,30 +28,50 @@ struct Arguments {
   int threads = 2;
   bool talks = false;
   int known_poses = 0;
+  std::uint64_t faults = 0;         ///< Every so many-th request; 0: none.
+  std::optional<double> displaced;  ///< Up to so many mm; 0: in their places, under the same scan.
 };
 
+/// The two halves of a comparison stand beside each other.
+std::string suffix(std::optional<double> displaced) {
+  if (!displaced) return "";
+  return *displaced > 0 ? ".displaced" : ".centred";
+}
+
 std::string header_of(const ProductionPart& part, const Arguments& arguments) {
-  return nlohmann::json{{"commit", kCommit},
+  nlohmann::json header{{"commit", kCommit},
                         {"part", part.name},
                         {"seed", arguments.seed},
                         {"objects", part.objects},
-                        {"threads", arguments.threads}}
-      .dump();
+                        {"threads", arguments.threads}};
+  if (arguments.faults > 0) header["fault_every"] = arguments.faults;
+  if (arguments.displaced) header["displaced_mm"] = *arguments.displaced;
+  return header.dump();
 }
 
 std::string file_of(const ProductionPart& part, const Arguments& arguments) {
-  return arguments.out + "/" + part.name + ".jsonl";
+  return arguments.out + "/" + part.name + suffix(arguments.displaced) + ".jsonl";
+}
+
+std::vector<ProductionPart> parts_of(const Arguments& arguments) {
+  std::vector<ProductionPart> parts = production_parts();
+  if (arguments.displaced) std::ranges::transform(parts, parts.begin(), to_be_located);
+  return parts;
 }
 
 /// Goes on where the file ends, bin by bin, until it has so many picks.
-void produce(const ProductionPart& part, const Arguments& arguments, int picks) {
+void produce(const ProductionPart& part, std::size_t number, const Arguments& arguments, int picks) {
   const std::string path = file_of(part, arguments);
   PartRun run = read_part_run(path, header_of(part, arguments));
   write_part_run(path, run);
   if (run.picks() >= picks) return;
   const auto data = load_production_cell(part, arguments.out, arguments.threads);
   for (std::uint64_t bin = run.bins.size() + 1; run.picks() < picks; ++bin) {
-    const BinOutcome outcome = run_bin(part, data, bin, arguments.seed);
+    BinTrials trials;
+    trials.faults = FaultPlan{arguments.faults, arguments.seed, number};
+    trials.requests_before = run.requests.size();
+    trials.displacement = displacement_of(bin, arguments.seed, arguments.displaced.value_or(0));
+    const BinOutcome outcome = run_bin(part, data, bin, arguments.seed, trials);
     append_bin(path, outcome.requests, outcome.bin);
     run.requests.insert(run.requests.end(), outcome.requests.begin(), outcome.requests.end());
     const auto taken = std::ranges::count(outcome.requests, "taken", &RequestRecord::grip);
@@ -55,6 +79,12 @@ void produce(const ProductionPart& part, const Arguments& arguments, int picks) 
         "%s, bin %llu: %ld taken in %zu requests, %d left (%d with a free grasp), ends with %s, %.1f CPU s; %d of %d\n",
         part.name.c_str(), static_cast<unsigned long long>(bin), static_cast<long>(taken), outcome.requests.size(),
         outcome.bin.left, outcome.bin.takeable, outcome.bin.end.c_str(), outcome.bin.cpu_s, run.picks(), picks);
+    for (const RequestRecord& r : outcome.requests)
+      if (arguments.talks && r.fault)
+        std::printf("  request %d, %s %s for %.2f s while %s%s: %s, alarms %s, ready %.2f s after it\n", r.request,
+                    r.fault->device.c_str(), r.fault->name.c_str(), r.fault->lasted_s, r.fault->phase.c_str(),
+                    r.fault->reached ? "" : " (never)", r.answer.c_str(), r.fault->alarms.c_str(),
+                    r.fault->recovered_s);
     for (const RequestRecord& r : outcome.requests)
       if (arguments.talks && r.answer == "pick" && r.grip != "taken")
         std::printf("  request %d, %s, error %.1f mm %.1f deg: %s\n", r.request, r.grasp.c_str(), r.error_mm,
@@ -81,8 +111,43 @@ void by_known_poses(const Arguments& arguments) {
   }
 }
 
-int main(int argc, char** argv) {
-  CLI::App app{"production: bins of the four example parts emptied by the emulated cell (docs/production.md)"};
+/// What there is in the folder.
+struct Runs {
+  std::vector<std::string> names;
+  std::vector<PartRun> runs;
+  bool complete = true;
+};
+Runs read_runs(const Arguments& arguments, int each) {
+  Runs all;
+  for (const ProductionPart& part : parts_of(arguments)) {
+    PartRun run = read_part_run(file_of(part, arguments), header_of(part, arguments));
+    all.complete &= run.picks() >= each;
+    if (run.bins.empty()) continue;
+    all.names.push_back(part.name);
+    all.runs.push_back(std::move(run));
+  }
+  return all;
+}
+
+/// Beside the run of the same bins in their places, or off them, where that is in the folder.
+bool compare(const Arguments& arguments, const ProductionFigures& all, int each) {
+  Arguments other = arguments;
+  const bool is_displaced = *arguments.displaced > 0;
+  other.displaced = is_displaced ? 0 : kDisplaced_mm;
+  const Runs others = read_runs(other, each);
+  if (others.runs.empty()) {
+    std::printf("\nnothing to compare with: run --displaced=%g into the same folder\n", *other.displaced);
+    return true;
+  }
+  if (!others.complete) std::printf("\nthe run to compare with is not complete\n");
+  const ProductionFigures other_all = figures_of("all", others.runs, robot_model());
+  const LocatedComparison comparison =
+      is_displaced ? LocatedComparison{all, other_all} : LocatedComparison{other_all, all};
+  std::printf("\n%s", to_table(comparison).c_str());
+  return comparison.meets_must();
+}
+
+Arguments parse(CLI::App& app, int argc, char** argv) {
   Arguments arguments;
   app.add_option("--picks", arguments.picks, "of all parts together")
       ->check(CLI::PositiveNumber)
@@ -95,39 +160,61 @@ int main(int argc, char** argv) {
   app.add_option("--threads", arguments.threads, "of detection")->capture_default_str();
   app.add_option("--known-poses", arguments.known_poses,
                  "so many bins by the gripper alone, poses known: what nobody could take");
+  auto* faults =
+      app.add_flag("--faults{50}", arguments.faults, "a device fails at every 50th request; =N: at every Nth");
+  double displaced = 0;
+  const auto* is_displaced =
+      app.add_flag("--displaced{80}", displaced,
+                   "each bin stands up to 80 mm and 10 degrees off and is located; =0: the same bins in their places")
+          ->check(CLI::IsMember({0.0, kDisplaced_mm}))
+          ->excludes(faults);
   app.add_flag("--talks", arguments.talks, "tells of each pick that failed");
-  CLI11_PARSE(app, argc, argv);
+  app.parse(argc, argv);
+  if (is_displaced->count() > 0) arguments.displaced = displaced;
+  return arguments;
+}
+
+int run(const Arguments& arguments) {
   log::set_threshold(log::Level::Error);
   std::filesystem::create_directories(arguments.out);
-
   if (arguments.known_poses > 0) return by_known_poses(arguments), 0;
-  const auto& parts = production_parts();
+  const std::vector<ProductionPart> parts = parts_of(arguments);
   const int each = (arguments.picks + static_cast<int>(parts.size()) - 1) / static_cast<int>(parts.size());
+  for (std::size_t number = 0; number < parts.size(); ++number)
+    if (arguments.part.empty() || arguments.part == parts[number].name) produce(parts[number], number, arguments, each);
+  const Runs all_runs = read_runs(arguments, each);
+  if (all_runs.runs.empty()) return 2;
   std::vector<ProductionFigures> figures;
-  std::vector<PartRun> runs;
-  bool complete = true;
-  for (const ProductionPart& part : parts) {
-    if (arguments.part.empty() || arguments.part == part.name) produce(part, arguments, each);
-    PartRun run = read_part_run(file_of(part, arguments), header_of(part, arguments));
-    complete &= run.picks() >= each;
-    if (run.bins.empty()) continue;
-    figures.push_back(figures_of(part.name, {run}, robot_model()));
-    runs.push_back(std::move(run));
-  }
-  if (runs.empty()) return 2;
-  const ProductionFigures all = figures_of("all", runs, robot_model());
+  for (std::size_t i = 0; i < all_runs.runs.size(); ++i)
+    figures.push_back(figures_of(all_runs.names[i], {all_runs.runs[i]}, robot_model()));
+  const ProductionFigures all = figures_of("all", all_runs.runs, robot_model());
   const RobotModel robot = robot_model();
   std::printf(
       "\nAll of it is simulation, seed %llu, %s. Robot: 1 m/s, 3 m/s², the last 120 mm at 0.25 m/s: %.1f s to the "
-      "grasp, "
-      "%.1f s out of the view, %.1f s to the place and back. Detection counts 0.15 s in the cycle's time, whatever it "
-      "took.\n\n%s",
+      "grasp, %.1f s out of the view, %.1f s to the place and back. Detection counts 0.15 s in the cycle's time, "
+      "whatever it took.\n\n%s",
       static_cast<unsigned long long>(arguments.seed), kCommit, robot.approach_s, robot.retreat_s, robot.place_s,
       to_table(figures, all).c_str());
-  draw_production(arguments.out + "/production.png", figures, all);
-  if (!complete) std::printf("\nnot complete: the must columns are of what there is\n");
-  const auto asked = demands(all);
-  return std::ranges::all_of(asked, &ProductionDemand::meets_must) ? 0 : 1;
+  draw_production(arguments.out + "/production" + suffix(arguments.displaced) + ".png", figures, all);
+  if (!all_runs.complete) std::printf("\nnot complete: the must columns are of what there is\n");
+  if (arguments.displaced) return compare(arguments, all, each) ? 0 : 1;
+  if (arguments.faults > 0) {
+    const FaultFigures faults = fault_figures_of(all_runs.names, all_runs.runs);
+    std::printf("\n%s", to_table(faults).c_str());
+    return faults.meets_must() ? 0 : 1;
+  }
+  return std::ranges::all_of(demands(all), &ProductionDemand::meets_must) ? 0 : 1;
+}
+
+int main(int argc, char** argv) {
+  CLI::App app{"production: bins of the four example parts emptied by the emulated cell (docs/production.md)"};
+  Arguments arguments;
+  try {
+    arguments = parse(app, argc, argv);
+  } catch (const CLI::ParseError& refused) {
+    return app.exit(refused);
+  }
+  return run(arguments);
 }
 }  // namespace
 }  // namespace binpick::bench

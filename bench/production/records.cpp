@@ -14,6 +14,30 @@ using Json = nlohmann::json;
 
 double rounded(double value, double step) { return std::isfinite(value) ? std::round(value / step) * step : 0; }
 
+FaultRecord to_fault(const Json& json) {
+  FaultRecord f;
+  json.at("device").get_to(f.device);
+  json.at("name").get_to(f.name);
+  json.at("phase").get_to(f.phase);
+  json.at("reached").get_to(f.reached);
+  json.at("lasted_s").get_to(f.lasted_s);
+  json.at("alarms").get_to(f.alarms);
+  json.at("recovered_s").get_to(f.recovered_s);
+  json.at("handshake_lost").get_to(f.handshake_lost);
+  return f;
+}
+
+Json to_json(const FaultRecord& f) {
+  return {{"device", f.device},
+          {"name", f.name},
+          {"phase", f.phase},
+          {"reached", f.reached},
+          {"lasted_s", rounded(f.lasted_s, 1e-3)},
+          {"alarms", f.alarms},
+          {"recovered_s", rounded(f.recovered_s, 1e-3)},
+          {"handshake_lost", f.handshake_lost}};
+}
+
 RequestRecord to_request(const Json& json) {
   RequestRecord r;
   json.at("bin").get_to(r.bin);
@@ -27,6 +51,11 @@ RequestRecord to_request(const Json& json) {
   json.at("detection_ms").get_to(r.detection_ms);
   json.at("first_ms").get_to(r.first_ms);
   json.at("first_hypotheses").get_to(r.first_hypotheses);
+  if (json.contains("fault")) r.fault = to_fault(json["fault"]);
+  r.closed_wrong = json.value("closed_wrong", false);
+  r.cause = json.value("cause", "");
+  r.place_mm = json.value("place_mm", 0.0);
+  r.place_deg = json.value("place_deg", 0.0);
   if (r.answer != "pick") return r;
   json.at("error_mm").get_to(r.error_mm);
   json.at("error_deg").get_to(r.error_deg);
@@ -66,6 +95,10 @@ std::string to_json(const RequestRecord& r) {
             {"detection_ms", rounded(r.detection_ms, 0.1)},
             {"first_ms", rounded(r.first_ms, 0.1)},
             {"first_hypotheses", r.first_hypotheses}};
+  if (r.fault) json["fault"] = to_json(*r.fault);
+  if (r.closed_wrong) json["closed_wrong"] = true;
+  if (!r.cause.empty()) json["cause"] = r.cause;
+  if (r.place_mm > 0) json.update({{"place_mm", rounded(r.place_mm, 1e-3)}, {"place_deg", rounded(r.place_deg, 1e-3)}});
   if (r.answer == "pick")
     json.update({{"error_mm", rounded(r.error_mm, 1e-3)},
                  {"error_deg", rounded(r.error_deg, 1e-3)},

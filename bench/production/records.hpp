@@ -10,6 +10,16 @@
 /// the end of each bin. A bin without its end is no bin: it is run again, and, as its seed is its number, it is the
 /// same.
 namespace binpick::bench {
+/// A device that failed during a request, and what became of it.
+struct FaultRecord {
+  std::string device, name, phase;
+  bool reached = true;  ///< False: the request ended before its phase came, and nothing failed.
+  double lasted_s = 0;
+  std::string alarms;           ///< That the PLC read, numbers.
+  double recovered_s = 0;       ///< From the device being healed to the handshake being idle and ready.
+  bool handshake_lost = false;  ///< Not without an abort or a restart.
+};
+
 struct RequestRecord {
   std::uint64_t bin = 0;
   int request = 0;      ///< In its bin, from 0 on.
@@ -30,6 +40,11 @@ struct RequestRecord {
   std::uint64_t first_hypotheses = 0;
   double scan_s = 0;   ///< Virtual: from the request to its answer.
   double robot_s = 0;  ///< Virtual: from the answer to the robot's report.
+  std::optional<FaultRecord> fault;
+  bool closed_wrong = false;  ///< In a run with faults: the gripper closed at a wrong pose, whoever sent it there.
+  std::string
+      cause;  ///< Of a wrong pose or a false "empty" at a fault or after it: "scene" (the same without), "fault".
+  double place_mm = 0, place_deg = 0;  ///< Of a supply that was located: how far off.
 };
 
 struct BinRecord {

@@ -1,8 +1,10 @@
 #include "bench/production/setup.hpp"
 
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <numbers>
 #include <stdexcept>
 
 #include "config/config.hpp"
@@ -14,6 +16,9 @@ namespace fs = std::filesystem;
 
 constexpr double kTravel_mm = 1500, kVertical_mm = 500, kLast_mm = 120;
 constexpr double kSpeed_mm_s = 1000, kAcceleration_mm_s2 = 3000, kSlow_mm_s = 250, kGripper_s = 0.3;
+
+/// Bins stand up to 80 mm and 10 degrees off; what is measured of that errs a little.
+constexpr const char* kLocated = "locate = true\nlocate_offset_max_mm = 84\nlocate_turn_max_deg = 10.5\n";
 
 /// From rest to rest.
 double move_s(double way_mm) { return way_mm / kSpeed_mm_s + kSpeed_mm_s / kAcceleration_mm_s2; }
@@ -74,15 +79,15 @@ T_base_supply = { xyz_mm = [1200, 0, 0], rpy_deg = [0, 0, 0] }
 sweep_start_deg = %g
 sweep_end_deg = %g
 sweep_speed_deg_s = %g
-
+%s
 [[part]]
 id = 1
 file = "%s"
 knowledge_base = "%s"
 )",
                 part.name.c_str(), part.height_mm, scanner.c_str(), threads, part.supply_mm.x(), part.supply_mm.y(),
-                part.supply_mm.z(), -part.sweep_deg, part.sweep_deg, part.sweep_deg_s, part_file.c_str(),
-                knowledge_base.c_str());
+                part.supply_mm.z(), -part.sweep_deg, part.sweep_deg, part.sweep_deg_s, part.is_located ? kLocated : "",
+                part_file.c_str(), knowledge_base.c_str());
   return text;
 }
 }  // namespace
@@ -95,6 +100,20 @@ const std::vector<ProductionPart>& production_parts() {
       {"contact_bridge", "lps36", {300, 300, 120}, 40, 560, 19, 10, 0, 3, 3},
   };
   return parts;
+}
+
+ProductionPart to_be_located(ProductionPart part) {
+  constexpr double kDegree = std::numbers::pi / 180, kBeyond_mm = 80 + 40, kScannerBelowPivot_mm = 60;
+  part.is_located = true;
+  if (part.scanner == "lms400")
+    part.line_deg = 35;
+  else
+    part.height_mm = 800;  // a light section is as wide as it is far away
+  const double reach_mm =
+      part.supply_mm.y() / 2 * std::cos(10 * kDegree) + part.supply_mm.x() / 2 * std::sin(10 * kDegree) + kBeyond_mm;
+  part.sweep_deg =
+      std::ceil(std::atan2(reach_mm, part.height_mm - kScannerBelowPivot_mm - part.supply_mm.z()) / kDegree);
+  return part;
 }
 
 RobotModel robot_model() {
@@ -117,7 +136,7 @@ std::shared_ptr<const daemon::CellData> load_production_cell(const ProductionPar
   const std::string part_file = emulators::write_example_part(part.name, base.string());
   const std::string knowledge_base = (base / (part.name + ".kb")).string();
   train_once(part_file, knowledge_base, threads);
-  const std::string cell_file = (base / (part.name + ".cell.toml")).string();
+  const std::string cell_file = (base / (part.name + (part.is_located ? ".located" : "") + ".cell.toml")).string();
   std::ofstream{cell_file} << cell_text(part, part_file, knowledge_base, threads);
   auto loaded = daemon::load_cell(cell_file);
   if (loaded) return *loaded;

@@ -63,6 +63,28 @@ TEST_F(Records, AreReadAsTheyWereWritten) {
   EXPECT_EQ(run.bins[1].end, "not_reachable");
 }
 
+TEST_F(Records, TellOfFaultsAndOfWhereTheSupplyStood) {
+  write_part_run(path_, {"{}", {}, {}});
+  RequestRecord faulted = answer(1, 0, "alarm 100", 4);
+  faulted.fault = FaultRecord{"pivot", "pulled", "sweeping", true, 2.5, "100 101", 0.75, true};
+  faulted.closed_wrong = true;
+  faulted.cause = "fault";
+  RequestRecord located = pick(1, 1, "taken");
+  located.place_mm = 1.25;
+  located.place_deg = 0.125;
+  append_bin(path_, {faulted, located}, bin(1, 0, 0, "empty"));
+  const PartRun run = read_part_run(path_, "{}");
+  ASSERT_EQ(run.requests.size(), 2U);
+  ASSERT_TRUE(run.requests[0].fault);
+  EXPECT_EQ(run.requests[0].fault->phase, "sweeping");
+  EXPECT_TRUE(run.requests[0].fault->handshake_lost);
+  EXPECT_EQ(to_json(run.requests[0]), to_json(faulted));
+  EXPECT_FALSE(run.requests[1].fault);
+  EXPECT_EQ(to_json(run.requests[1]), to_json(located));
+  const ProductionFigures f = figures_of("all", {run}, {1, 1, 1, 5});
+  EXPECT_DOUBLE_EQ(f.place_mm.p50, 1.25);
+}
+
 TEST_F(Records, ABinThatWasCutOffIsRunAgain) {
   write_part_run(path_, {"{}", {}, {}});
   append_bin(path_, {pick(1, 0, "taken")}, bin(1, 0, 0, "empty"));
