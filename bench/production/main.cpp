@@ -136,7 +136,7 @@ bool compare(const Arguments& arguments, const ProductionFigures& all, int each)
   other.displaced = is_displaced ? 0 : kDisplaced_mm;
   const Runs others = read_runs(other, each);
   if (others.runs.empty()) {
-    std::printf("\nnothing to compare with: run --displaced=%g into the same folder\n", *other.displaced);
+    std::printf("\nnothing to compare with: run %s into the same folder\n", is_displaced ? "--centred" : "--displaced");
     return true;
   }
   if (!others.complete) std::printf("\nthe run to compare with is not complete\n");
@@ -161,16 +161,19 @@ Arguments parse(CLI::App& app, int argc, char** argv) {
   app.add_option("--known-poses", arguments.known_poses,
                  "so many bins by the gripper alone, poses known: what nobody could take");
   auto* faults =
-      app.add_flag("--faults{50}", arguments.faults, "a device fails at every 50th request; =N: at every Nth");
-  double displaced = 0;
-  const auto* is_displaced =
-      app.add_flag("--displaced{80}", displaced,
-                   "each bin stands up to 80 mm and 10 degrees off and is located; =0: the same bins in their places")
-          ->check(CLI::IsMember({0.0, kDisplaced_mm}))
-          ->excludes(faults);
+      app.add_flag("--faults{50}", arguments.faults, "a device fails at every 50th request; =N: at every Nth")
+          ->check(CLI::Range(1, 1'000'000));
+  bool is_displaced = false, is_centred = false;
+  auto* displaced =
+      app.add_flag("--displaced", is_displaced, "each bin stands up to 80 mm and 10 degrees off and is located");
+  app.add_flag("--centred", is_centred, "the same bins in their places, under the same scan")
+      ->excludes(faults)
+      ->excludes(displaced);
+  displaced->excludes(faults);
   app.add_flag("--talks", arguments.talks, "tells of each pick that failed");
   app.parse(argc, argv);
-  if (is_displaced->count() > 0) arguments.displaced = displaced;
+  if (is_displaced) arguments.displaced = kDisplaced_mm;
+  if (is_centred) arguments.displaced = 0;
   return arguments;
 }
 
