@@ -146,7 +146,9 @@ class BinRun {
   }
 
   void ask_faulted(const PlannedFault& planned, RequestRecord& record) {
-    const FaultedAnswer answer = ask_with_fault(cell_, planned);
+    const RobotModel robot = robot_model();
+    const FaultedAnswer answer =
+        ask_with_fault(cell_, planned, from_s(robot.approach_s + robot.grasp_s + robot.retreat_s));
     answered_ = cell_.now();
     record.fault = answer.fault;
     take_answer(answer.result, answer.alarm, record);

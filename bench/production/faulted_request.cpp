@@ -5,8 +5,6 @@
 #include <functional>
 #include <set>
 
-#include "bench/production/setup.hpp"
-
 namespace binpick::bench {
 namespace {
 using namespace std::chrono_literals;
@@ -30,9 +28,10 @@ DeviceFault chosen(const PlannedFault& planned) {
 
 class FaultedRequest {
  public:
-  FaultedRequest(EmulatedCell& cell, const PlannedFault& planned)
+  FaultedRequest(EmulatedCell& cell, const PlannedFault& planned, Duration picking)
       : cell_{cell},
         planned_{planned},
+        picking_{picking},
         fault_{chosen(planned)},
         lasts_{std::min(from_s(planned.lasts_s), fault_.lasts_max)} {
     answer_.fault.device = planned.device;
@@ -101,13 +100,9 @@ class FaultedRequest {
       case CyclePhase::Detecting:
         return in_s(cell_.detection_time);
       case CyclePhase::Picking:
-        return picking_s();
+        return in_s(picking_);
     }
     return 0;
-  }
-  double picking_s() const {
-    const RobotModel robot = robot_model();
-    return robot.approach_s + robot.grasp_s + robot.retreat_s;
   }
 
   /// A request would be accepted, and none is under way.
@@ -159,6 +154,7 @@ class FaultedRequest {
 
   EmulatedCell& cell_;
   const PlannedFault& planned_;
+  const Duration picking_;
   const DeviceFault fault_;
   const Duration lasts_;
   FaultedAnswer answer_;
@@ -169,7 +165,7 @@ class FaultedRequest {
 };
 }  // namespace
 
-FaultedAnswer ask_with_fault(EmulatedCell& cell, const PlannedFault& planned) {
-  return FaultedRequest{cell, planned}.run();
+FaultedAnswer ask_with_fault(EmulatedCell& cell, const PlannedFault& planned, Duration picking) {
+  return FaultedRequest{cell, planned, picking}.run();
 }
 }  // namespace binpick::bench

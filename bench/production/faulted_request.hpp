@@ -14,5 +14,6 @@ struct FaultedAnswer {
   std::optional<plc::Alarm> alarm;  ///< That ended the request instead.
   FaultRecord fault;
 };
-FaultedAnswer ask_with_fault(support::EmulatedCell& cell, const PlannedFault& planned);
+/// The robot is away for `picking` with each pick.
+FaultedAnswer ask_with_fault(support::EmulatedCell& cell, const PlannedFault& planned, Duration picking);
 }  // namespace binpick::bench
