@@ -8,8 +8,11 @@
 #include <limits>
 #include <numbers>
 #include <set>
+#include <stdexcept>
 
 #include "bench/production/faulted_request.hpp"
+#include "daemon/cycle/record_codec.hpp"
+#include "daemon/record_ring.hpp"
 #include "plc/alarms.hpp"
 #include "tests/emulators/world/grip.hpp"
 #include "tests/emulators/world/living_pile.hpp"
@@ -80,6 +83,7 @@ class BinRun {
   BinOutcome run(std::uint64_t number) {
     const double began_s = cpu_s();
     outcome_.bin.bin = number;
+    daemon::RecordRing records{data_->config.record.dir + "/" + part_.name + "-" + std::to_string(number)};
     outcome_.bin.objects = part_.objects;
     cell_.run_until_ready();
     int without_pick = 0;
@@ -88,6 +92,7 @@ class BinRun {
       record.bin = number;
       record.request = request;
       ask(record);
+      while (const auto left = cell_.cell().take_record()) keep(records, *left);
       outcome_.requests.push_back(record);
       if (!record.fault) {
         without_pick = record.answer == "pick" ? 0 : without_pick + 1;
@@ -102,6 +107,13 @@ class BinRun {
   }
 
  private:
+  /// The whole bin, whatever its size. Throws std::runtime_error.
+  static void keep(daemon::RecordRing& records, const daemon::Record& record) {
+    const auto kept = records.write(daemon::record_name(record.origin), daemon::encode(record),
+                                    std::numeric_limits<std::uint64_t>::max());
+    if (!kept) throw std::runtime_error(kept.error());
+  }
+
   void ask(RequestRecord& record) {
     record.left_before = static_cast<int>(pile_.world().objects().size());
     record_ = &record;

@@ -24,7 +24,7 @@ constexpr double kDisplaced_mm = 80;
 struct Arguments {
   int picks = 3000;
   std::uint64_t seed = 1;
-  std::string part, out = "build/production";
+  std::string part, out = "build/production", records;
   int threads = 2;
   bool talks = false;
   int known_poses = 0;
@@ -65,7 +65,7 @@ void produce(const ProductionPart& part, std::size_t number, const Arguments& ar
   PartRun run = read_part_run(path, header_of(part, arguments));
   write_part_run(path, run);
   if (run.picks() >= picks) return;
-  const auto data = load_production_cell(part, arguments.out, arguments.threads);
+  const auto data = load_production_cell(part, arguments.out, arguments.threads, arguments.records);
   for (std::uint64_t bin = run.bins.size() + 1; run.picks() < picks; ++bin) {
     BinTrials trials;
     trials.faults = FaultPlan{arguments.faults, arguments.seed, number};
@@ -157,6 +157,8 @@ Arguments parse(CLI::App& app, int argc, char** argv) {
                  "only this one, for runs beside each other; the table is of all in the folder");
   app.add_option("--out", arguments.out, "folder of records; a run goes on where it was stopped")
       ->capture_default_str();
+  app.add_option("--records", arguments.records,
+                 "keep the daemon's records here, a folder for each bin (docs/records.md)");
   app.add_option("--threads", arguments.threads, "of detection")->capture_default_str();
   app.add_option("--known-poses", arguments.known_poses,
                  "so many bins by the gripper alone, poses known: what nobody could take");

@@ -131,13 +131,16 @@ emulators::RobotOptions robot_options(const RobotModel& model) {
 }
 
 std::shared_ptr<const daemon::CellData> load_production_cell(const ProductionPart& part, const std::string& folder,
-                                                             int threads) {
+                                                             int threads, const std::string& records) {
   const fs::path base = fs::absolute(folder) / "cells";
   const std::string part_file = emulators::write_example_part(part.name, base.string());
   const std::string knowledge_base = (base / (part.name + ".kb")).string();
   train_once(part_file, knowledge_base, threads);
   const std::string cell_file = (base / (part.name + (part.is_located ? ".located" : "") + ".cell.toml")).string();
-  std::ofstream{cell_file} << cell_text(part, part_file, knowledge_base, threads);
+  std::ofstream file{cell_file};
+  file << cell_text(part, part_file, knowledge_base, threads);
+  if (!records.empty()) file << "\n[record]\ndir = \"" << fs::absolute(records).string() << "\"\n";
+  file.close();
   auto loaded = daemon::load_cell(cell_file);
   if (loaded) return *loaded;
   std::string text;

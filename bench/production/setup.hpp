@@ -32,8 +32,8 @@ ProductionPart to_be_located(ProductionPart part);
 RobotModel robot_model();
 emulators::RobotOptions robot_options(const RobotModel& model);
 
-/// Writes part and cell file into `folder`, trains what is not trained there yet, and loads it. Throws
-/// std::runtime_error.
+/// Writes part and cell file into `folder`, trains what is not trained there yet, and loads it; a cell with
+/// a folder for `records` makes them. Throws std::runtime_error.
 std::shared_ptr<const daemon::CellData> load_production_cell(const ProductionPart& part, const std::string& folder,
-                                                             int threads);
+                                                             int threads, const std::string& records = {});
 }  // namespace binpick::bench
