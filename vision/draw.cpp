@@ -13,11 +13,11 @@
 
 namespace binpick::vision {
 namespace {
-constexpr int kWidthMinPx = 1200;
 constexpr int kScaleMax = 16;
 constexpr int kLegendPx = 96;
 constexpr std::size_t kRejectedDrawn = 6;
-const cv::Scalar kInk{235, 235, 235}, kRejectedInk{200, 170, 150}, kHalo{20, 20, 20}, kChosen{255, 200, 0};
+const cv::Scalar kInk{235, 235, 235}, kRejectedInk{200, 170, 150}, kHalo{20, 20, 20}, kChosen{255, 200, 0},
+    kGripper{240, 110, 255};
 
 /// Where supply coordinates fall in the picture: x to the right, y up, as seen from above.
 struct Canvas {
@@ -67,6 +67,19 @@ cv::Vec3b height_colour(float share) {
   const auto k = static_cast<std::size_t>(i);
   const cv::Vec3f c = stops[k] * (1 - f) + stops[k + 1] * f;
   return {cv::saturate_cast<uchar>(c[0]), cv::saturate_cast<uchar>(c[1]), cv::saturate_cast<uchar>(c[2])};
+}
+
+/// Each height the median of its neighbourhood; what was not measured stays so.
+DepthImage without_noise(DepthImage image) {
+  const auto rows = static_cast<int>(image.z_mm.rows()), cols = static_cast<int>(image.z_mm.cols());
+  cv::Mat z(rows, cols, CV_32F), calm;
+  for (int r = 0; r < rows; ++r)
+    for (int c = 0; c < cols; ++c) z.at<float>(r, c) = std::isfinite(image.z_mm(r, c)) ? image.z_mm(r, c) : 0;
+  cv::medianBlur(z, calm, 5);
+  for (int r = 0; r < rows; ++r)
+    for (int c = 0; c < cols; ++c)
+      if (std::isfinite(image.z_mm(r, c))) image.z_mm(r, c) = calm.at<float>(r, c);
+  return image;
 }
 
 /// Height as colour, light from the upper left; what was not measured is nearly black.
@@ -198,16 +211,19 @@ cv::Mat legend(const Canvas& canvas, const KnowledgeBase& part, const DetectionR
   x += 160;
   if (chosen) {
     cv::line(strip, {x, 61}, {x + 46, 61}, kChosen, 5);
-    write_text(strip, "chosen grasp", {x, 84}, 0.45, kInk, false);
-    x += 130;
+    write_text(strip, "chosen", {x, 84}, 0.45, kInk, false);
+    x += 90;
+    cv::line(strip, {x, 61}, {x + 46, 61}, kGripper, 3);
+    write_text(strip, "its grasp", {x, 84}, 0.45, kInk, false);
+    x += 100;
   }
   for (int k = 0; k < 46; k += 10) cv::line(strip, {x + k, 61}, {x + k + 5, 61}, kRejectedInk, 1);
   write_text(strip, "rejected", {x, 84}, 0.45, kInk, false);
   return strip;
 }
 
-/// Jaws as they come in and, thinner, the body above them, from above.
-void draw_gripper(Canvas& canvas, const Reachable& chosen, const Gripper& gripper, const Grasp& grasp) {
+/// Jaws as they come in, filled, and the body above them as lines, from above.
+void draw_gripper(Canvas& canvas, const Reachable& chosen, const Gripper& gripper, const Grasp& grasp, int pen) {
   const std::vector<Gripper::Solid> solids =
       solids_of(gripper, grasp.opening_mm.value_or(gripper.jaws ? gripper.jaws->opening_max_mm : 0));
   for (std::size_t i = 0; i < solids.size(); ++i) {
@@ -220,35 +236,36 @@ void draw_gripper(Canvas& canvas, const Reachable& chosen, const Gripper& grippe
       corners.emplace_back(canvas.at(corner.x(), corner.y()));
     }
     cv::convexHull(corners, outline);
-    const int pen = i < gripper.body.size() ? 1 : 2;
-    cv::polylines(canvas.picture, outline, true, kHalo, pen + 2, cv::LINE_AA);
-    cv::polylines(canvas.picture, outline, true, kChosen, pen, cv::LINE_AA);
+    cv::polylines(canvas.picture, outline, true, kHalo, 3 * pen, cv::LINE_AA);
+    cv::polylines(canvas.picture, outline, true, kGripper, pen, cv::LINE_AA);
+    if (i >= gripper.body.size()) cv::fillConvexPoly(canvas.picture, outline, kGripper, cv::LINE_AA);
   }
 }
 
-void draw_grasp(Canvas& canvas, const Reachable& chosen) {
+void draw_grasp(Canvas& canvas, const Reachable& chosen, int pen) {
   const Eigen::Vector3d grasp = chosen.T_supply_grasp.iso.translation();
   const Eigen::Vector3d from = chosen.T_supply_approach.iso.translation();
   const cv::Point at = canvas.at(grasp.x(), grasp.y()), start = canvas.at(from.x(), from.y());
-  cv::line(canvas.picture, start, at, kHalo, 5, cv::LINE_AA);
-  cv::line(canvas.picture, start, at, kChosen, 3, cv::LINE_AA);
-  cv::circle(canvas.picture, at, 7, kHalo, 4, cv::LINE_AA);
-  cv::circle(canvas.picture, at, 7, kChosen, 2, cv::LINE_AA);
+  cv::line(canvas.picture, start, at, kHalo, 5 * pen, cv::LINE_AA);
+  cv::line(canvas.picture, start, at, kGripper, 3 * pen, cv::LINE_AA);
+  cv::circle(canvas.picture, at, 7 * pen, kHalo, 4 * pen, cv::LINE_AA);
+  cv::circle(canvas.picture, at, 7 * pen, kGripper, 2 * pen, cv::LINE_AA);
 }
 }  // namespace
 
 Expected<void, std::string> draw_report(const std::string& png_path, const DepthImage& image, const KnowledgeBase& part,
                                         const DetectionReport& report, const Reachable* chosen, const Gripper* gripper,
-                                        const Grasp* grasp) {
+                                        const Grasp* grasp, const DrawStyle& style) {
   if (image.z_mm.size() == 0) return unexpected(png_path + ": there is no depth image to draw; give one with pixels");
   const auto cols = static_cast<int>(image.z_mm.cols());
   Canvas canvas;
-  canvas.scale = std::clamp((kWidthMinPx + cols - 1) / cols, 1, kScaleMax);
+  canvas.scale = std::clamp((style.width_min_px + cols - 1) / cols, 1, kScaleMax);
   canvas.rows = static_cast<int>(image.z_mm.rows());
   canvas.pixel_mm = image.pixel_mm;
   canvas.origin_mm = image.origin_mm;
-  const HeightRange range = height_range(image, static_cast<float>(part.diameter_mm()) / 4);
-  canvas.picture = shaded(image, range, canvas.scale);
+  const HeightRange range = style.height_max_mm ? HeightRange{0, static_cast<float>(*style.height_max_mm)}
+                                                : height_range(image, static_cast<float>(part.diameter_mm()) / 4);
+  canvas.picture = shaded(style.noise ? image : without_noise(image), range, canvas.scale);
 
   const Rasteriser rasteriser{part.mesh()};
   const float jump_mm = jump_of(part.noise_mm(), image.pixel_mm);
@@ -260,7 +277,7 @@ Expected<void, std::string> draw_report(const std::string& png_path, const Depth
   // What a detection explains better needs no picture: its outline would lie beside the better one's.
   std::vector<const Rejection*> shown;
   for (const Rejection& rejection : report.rejected)
-    if (rejection.reason.find("better one") == std::string::npos) shown.push_back(&rejection);
+    if (style.words && rejection.reason.find("better one") == std::string::npos) shown.push_back(&rejection);
   for (std::size_t k = 0; k < std::min(kRejectedDrawn, shown.size()); ++k) {
     const Rejection& rejection = *shown[k];
     for (const Contour& contour : outline_of(canvas, image, rasteriser, jump_mm, rejection.T_supply_object))
@@ -273,16 +290,19 @@ Expected<void, std::string> draw_report(const std::string& png_path, const Depth
     const Detection& detection = report.detections[k];
     const bool is_chosen = chosen != nullptr && chosen->detection == k;
     const std::vector<Contour> outline = outline_of(canvas, image, rasteriser, jump_mm, detection.T_supply_object);
-    if (is_chosen) draw_outline(canvas.picture, outline, kChosen, 9);
-    draw_outline(canvas.picture, outline, colour_of(detection.score), is_chosen ? 4 : 2);
-    write_text(canvas.picture, format("%zu: %.2f", k + 1, detection.score), label_place(detection.T_supply_object), 0.5,
-               colour_of(detection.score), true);
+    if (is_chosen) draw_outline(canvas.picture, outline, kChosen, (style.words ? 9 : 4) * style.pen);
+    if (!is_chosen || style.words)
+      draw_outline(canvas.picture, outline, colour_of(detection.score), (is_chosen ? 4 : 2) * style.pen);
+    if (style.words)
+      write_text(canvas.picture, format("%zu: %.2f", k + 1, detection.score), label_place(detection.T_supply_object),
+                 0.5, colour_of(detection.score), true);
   }
-  if (chosen != nullptr && gripper != nullptr && grasp != nullptr) draw_gripper(canvas, *chosen, *gripper, *grasp);
-  if (chosen != nullptr) draw_grasp(canvas, *chosen);
+  if (chosen != nullptr && gripper != nullptr && grasp != nullptr)
+    draw_gripper(canvas, *chosen, *gripper, *grasp, style.pen);
+  if (chosen != nullptr) draw_grasp(canvas, *chosen, style.pen);
 
-  cv::Mat whole;
-  cv::vconcat(canvas.picture, legend(canvas, part, report, range, chosen != nullptr), whole);
+  cv::Mat whole = canvas.picture;
+  if (style.words) cv::vconcat(canvas.picture, legend(canvas, part, report, range, chosen != nullptr), whole);
   try {
     if (!cv::imwrite(png_path, whole))
       return unexpected(png_path + ": cannot be written; check that the folder exists and has room");

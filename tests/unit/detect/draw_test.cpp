@@ -5,6 +5,7 @@
 #include <fstream>
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <string>
 
 #include "tests/unit/detect/scenes.hpp"
@@ -56,6 +57,32 @@ TEST(Draw, WallsLeaveTheColoursToTheObjects) {
   const auto gray = [&](int row, int col) { return int{picture.at<unsigned char>(row * scale, col * scale)}; };
   EXPECT_GT(gray(kSide / 2, kSide / 2), gray(kSide / 8, kSide / 2) + 100);
   EXPECT_GE(gray(0, kSide / 2), gray(kSide / 2, kSide / 2) - 5);  // higher is not darker
+  std::filesystem::remove(png_path());
+}
+
+TEST(Draw, TheGripperAtTheChosenGraspAndNoWords) {
+  const DepthImage image = scenes::image_of(scenes::bracket_base().mesh(), {scenes::pose(0, 0, 0, 0)}, 2);
+  const DetectionReport report = detect(image, scenes::kSupply, scenes::bracket_base(), scenes::options());
+  const GraspChoice choice =
+      choose_grasps(report, scenes::bracket_base().symmetry(), {Grasp{}}, scenes::kSupply, {4.0});
+  ASSERT_FALSE(choice.reachable.empty());
+  Gripper gripper;
+  gripper.jaws = Gripper::Jaws{60, {20, 40, 50}, 0};
+  const Grasp grasp;
+  const DrawStyle style{.width_min_px = 300, .pen = 1, .words = false, .noise = false, .height_max_mm = 100};
+  const auto pink_px = [&](const Gripper* shown) {
+    EXPECT_TRUE(
+        draw_report(png_path(), image, scenes::bracket_base(), report, &choice.reachable.front(), shown, &grasp, style)
+            .has_value());
+    const cv::Mat picture = cv::imread(png_path());
+    const auto scale = picture.cols / static_cast<int>(image.z_mm.cols());
+    EXPECT_EQ(picture.rows, image.z_mm.rows() * scale) << "no legend below";
+    cv::Mat pink;
+    cv::inRange(picture, cv::Scalar{235, 105, 250}, cv::Scalar{245, 115, 255}, pink);
+    return cv::countNonZero(pink) / (scale * scale);
+  };
+  const double jaws_px = 2 * 20 * 40 / (image.pixel_mm * image.pixel_mm);  // from above
+  EXPECT_NEAR(pink_px(&gripper) - pink_px(nullptr), jaws_px, 0.2 * jaws_px);
   std::filesystem::remove(png_path());
 }
 
