@@ -128,6 +128,41 @@ struct Floor {
   double height_mm;
 };
 
+/// A needle lies as the neighbour does that it goes with: the one along its longest edge, and where that is one of
+/// several needles that only know each other, along any other edge.
+std::vector<Floor> floors_of(const Mesh& mesh, const std::vector<Triangle>& hull,
+                             const std::unordered_map<std::uint64_t, std::uint32_t>& face_of_edge,
+                             const Vector3d& centre) {
+  const auto at = [&](std::uint32_t v) -> Vector3d { return mesh.vertices_mm[v].cast<double>(); };
+  std::vector<std::optional<Floor>> known;
+  for (const Triangle& t : hull) {
+    const auto normal = normal_of(mesh, t);
+    known.push_back(normal ? std::optional{Floor{*normal, normal->dot(at(t[0]) - centre)}} : std::nullopt);
+  }
+  // Whether some needle found its neighbour.
+  const auto ask_neighbours = [&](std::size_t edges) {
+    bool found = false;
+    for (std::uint32_t i = 0; i < hull.size(); ++i) {
+      if (known[i]) continue;
+      std::array<std::pair<double, std::uint64_t>, 3> by_length;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::uint32_t a = hull[i][k], b = hull[i][(k + 1) % 3];
+        by_length[k] = {-(at(a) - at(b)).norm(), edge_key(b, a)};
+      }
+      std::ranges::sort(by_length);
+      for (std::size_t k = 0; k < edges && !known[i]; ++k)
+        if (const auto across = face_of_edge.find(by_length[k].second); across != face_of_edge.end())
+          known[i] = known[across->second];
+      found |= known[i].has_value();
+    }
+    return found;
+  };
+  while (ask_neighbours(1) || ask_neighbours(3)) continue;
+  std::vector<Floor> floors;
+  for (const auto& floor : known) floors.push_back(floor.value_or(Floor{Vector3d::UnitZ(), 0}));
+  return floors;
+}
+
 /// Rolling over the edge that two of them share.
 struct Tipping {
   double over_mm;  ///< The centre of mass's highest point on the way.
@@ -227,27 +262,10 @@ std::vector<RestingPose> resting_poses(const Mesh& mesh, const Symmetry& symmetr
   const auto hull = convex_hull(mesh.vertices_mm);
   const Vector3d centre = centre_of_mass_mm(mesh);
   const auto at = [&](std::uint32_t v) -> Vector3d { return mesh.vertices_mm[v].cast<double>(); };
-  std::vector<Floor> floors;
   std::unordered_map<std::uint64_t, std::uint32_t> face_of_edge;
-  std::vector<std::uint64_t> needles;  // By the edge to the neighbour that they go with.
-  for (const Triangle& t : hull) {
-    std::uint64_t longest = 0;
-    double length = -1;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const std::uint32_t a = t[k], b = t[(k + 1) % 3];
-      face_of_edge[edge_key(a, b)] = static_cast<std::uint32_t>(floors.size());
-      if (const double d = (at(a) - at(b)).norm(); d > length) length = d, longest = edge_key(a, b);
-    }
-    const auto normal = normal_of(mesh, t);
-    if (!normal) needles.push_back(longest);
-    const Vector3d down = normal.value_or(Vector3d::UnitZ());
-    floors.push_back({down, down.dot(at(t[0]) - centre)});
-  }
-  // A needle lies as its neighbour does. Two rounds, as that may be one, too.
-  for (int round = 0; round < 2; ++round)
-    for (const std::uint64_t key : needles)
-      if (const auto across = face_of_edge.find(key << 32 | key >> 32); across != face_of_edge.end())
-        floors[face_of_edge[key]] = floors[across->second];
+  for (std::uint32_t i = 0; i < hull.size(); ++i)
+    for (std::size_t k = 0; k < 3; ++k) face_of_edge[edge_key(hull[i][k], hull[i][(k + 1) % 3])] = i;
+  const std::vector<Floor> floors = floors_of(mesh, hull, face_of_edge, centre);
   std::vector<Tipping> tippings;
   for (const auto& [key, face] : face_of_edge) {
     const auto a = static_cast<std::uint32_t>(key >> 32), b = static_cast<std::uint32_t>(key);

@@ -73,6 +73,22 @@ INSTANTIATE_TEST_SUITE_P(Solids, KnownRestingPoses,
                                          Known{"lens", stretched(shapes::sphere(30), 0.6F), {18}}),
                          [](const auto& parameter) { return std::string(parameter.param.name); });
 
+TEST(RestingPoses, EdgesFullOfPointsAreNoFloors) {
+  // Three boxes in a row whose long edges lie in line: the hull has needles there that only touch other needles.
+  Mesh mesh;
+  for (const float x : {-24.0F, 0.0F, 24.0F})
+    for (const Mesh& box : {shapes::box(12, 18, 12), shapes::box(48, 18, 12)}) {
+      const auto first = static_cast<std::uint32_t>(mesh.vertices_mm.size());
+      for (const Eigen::Vector3f& v : box.vertices_mm) mesh.vertices_mm.push_back(v + Eigen::Vector3f{x, 0, 0});
+      for (auto t : box.triangles) mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+    }
+  const auto poses = resting_poses(mesh, {}, 0.1, 6 * kDeg);
+  Heights heights;
+  for (const RestingPose& pose : poses) heights.push_back(pose.height_mm);
+  ASSERT_EQ(heights.size(), 6U) << "as of the one box that encloses them";
+  for (std::size_t k = 0; k < 6; ++k) EXPECT_NEAR(heights[k], (Heights{6, 6, 9, 9, 48, 48}[k]), 0.01);
+}
+
 TEST(ConvexHull, EnclosesEveryPointAndIsClosed) {
   std::mt19937_64 random(9);
   std::normal_distribution<float> normal;
