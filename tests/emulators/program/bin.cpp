@@ -9,6 +9,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "tests/emulators/world/belt.hpp"
 #include "tests/emulators/world/example_parts.hpp"
 #include "vision/knowledge_base.hpp"
 
@@ -74,7 +75,12 @@ Bin::Bin(const config::Config& config, const BinOptions& options)
       pile_{fill(options.seed)} {}
 
 LivingPile Bin::fill(std::uint64_t seed) const {
-  return {body_of(part_, mesh_), options_.objects, supply_.size_mm, seed};
+  const ExamplePart part = body_of(part_, mesh_);
+  if (!is_belt()) return {part, options_.objects, supply_.size_mm, seed};
+  const auto lying = lay_apart(part, options_.objects, supply_.size_mm.head<2>(), seed);
+  if (lying.empty() && options_.objects > 0)
+    throw std::runtime_error("supply.size_mm: no object lies wholly within this window over the belt; make it larger");
+  return {part, lying, supply_.size_mm};
 }
 
 std::size_t Bin::objects_left() const { return world().objects().size(); }

@@ -10,7 +10,8 @@
 #include "tests/emulators/world/living_pile.hpp"
 #include "vision/symmetry.hpp"
 
-/// The emulated supply with its objects, and the truth about them.
+/// The emulated supply with its objects, and the truth about them. A supply without walls is the window over a belt:
+/// objects lie there by themselves.
 namespace binpick::emulators {
 struct BinOptions {
   std::size_t recipe = 0;  ///< Index in the cell file's recipes.
@@ -21,10 +22,12 @@ struct BinOptions {
 
 class Bin {
  public:
-  /// Drops the objects and lets them settle: takes seconds. Throws std::runtime_error (a mesh that cannot be read).
+  /// Drops the objects and lets them settle: takes seconds. A belt bears as many as there is room for (belt.hpp).
+  /// Throws std::runtime_error (a mesh that cannot be read).
   Bin(const config::Config& config, const BinOptions& options);
 
   const World& world() const { return pile_.world(); }
+  bool is_belt() const { return supply_.size_mm.z() <= 0; }
   std::size_t objects_left() const;
   /// Objects that lie over or under another one, seen from above.
   std::size_t overlapping() const;
@@ -45,7 +48,8 @@ class Bin {
   /// The highest object goes. False when the bin is empty.
   bool take_highest();
 
-  /// Fills a new bin with the next seed, in a thread of its own; it is in place when poll_refill() says so.
+  /// Fills a new bin with the next seed, or moves the belt on, in a thread of its own; it is in place when
+  /// poll_refill() says so.
   void start_refill();
   bool refilling() const { return next_.valid(); }
   bool poll_refill();  ///< True once, when the new objects are in.

@@ -23,6 +23,7 @@ struct Arguments {
   std::vector<std::string> without;
   double pick_time_s = 8, pause_s = 0, timeout_s = 0;
   bool serve = false;
+  bool conveyor = false;
   RunOptions run;
 };
 
@@ -31,8 +32,9 @@ int complain(const std::string& text) {
   return kExitUsage;
 }
 
-int write_parts(const std::string& folder) {
-  for (const auto& name : example_part_names()) std::printf("%s\n", write_example_part(name, folder).c_str());
+int write_parts(const std::string& folder, bool conveyor) {
+  const auto picking = conveyor ? vision::Picking::Conveyor : vision::Picking::Bin;
+  for (const auto& name : example_part_names()) std::printf("%s\n", write_example_part(name, folder, picking).c_str());
   return 0;
 }
 
@@ -101,11 +103,14 @@ int main(int argc, char** argv) {
   cell->fallthrough();
   auto* parts = app.add_subcommand("parts", "write the four example parts (meshes and PART.toml) and end");
   parts->add_option("folder", arguments.parts_folder, "where to")->required();
+  parts->add_flag("--conveyor", arguments.conveyor, "with picking = \"conveyor\", for objects that lie by themselves");
 
   app.add_option("--config", arguments.config, "cell file: addresses, mounts, supplies, parts");
   app.add_option("--part", arguments.part, "what lies in the bin: name or id of a [[part]]; default: the first");
   app.add_option("--supply", arguments.supply, "where: name or id of a [[supply]]; default: the first");
-  app.add_option("--objects", run.bin.objects, "in a full bin")->check(CLI::Range(0, 200))->capture_default_str();
+  app.add_option("--objects", run.bin.objects, "in a full bin, or on the belt: a supply whose walls are 0 mm high")
+      ->check(CLI::Range(0, 200))
+      ->capture_default_str();
   app.add_option("--seed", run.bin.seed, "of pile and noise")->capture_default_str();
   app.add_option("--cycles", run.cycles, "end after so many picks; 0: go on until told to quit")
       ->check(CLI::NonNegativeNumber)
@@ -143,7 +148,7 @@ int main(int argc, char** argv) {
     return complain(std::string{error.what()} + "; binpick-emulator --help says what it takes");
   }
   run.requests = !by_hand;
-  if (parts->parsed()) return write_parts(arguments.parts_folder);
+  if (parts->parsed()) return write_parts(arguments.parts_folder, arguments.conveyor);
   if (cell->parsed()) {
     run.devices = {Device::Plc, Device::Pivot, Device::Scanner, Device::Robot};
     for (const Device which : {Device::Plc, Device::Pivot, Device::Scanner, Device::Robot})

@@ -8,6 +8,7 @@
 #include <sys/epoll.h>
 #include <sys/signalfd.h>
 #include <unistd.h>
+#include <utility>
 
 #include "tests/emulators/program/pick_line.hpp"
 #include "tests/emulators/program/scan_paths.hpp"
@@ -129,9 +130,13 @@ WhereScanner Run::where_scanner(const config::Supply& supply) {
 }
 
 void Run::say_bin(const char* what) const {
-  say("bin: %s%zu of %s, %zu of them over or under another, seed %llu", what, bin_.objects_left(),
-      config_.recipes.at(options_.bin.recipe).part.options.name.c_str(), bin_.overlapping(),
-      static_cast<unsigned long long>(bin_.seed()));
+  const std::string part = config_.recipes.at(options_.bin.recipe).part.options.name;
+  const auto seed = static_cast<unsigned long long>(bin_.seed());
+  if (bin_.is_belt())
+    say("belt: %s%zu of %s, each by itself, seed %llu", what, bin_.objects_left(), part.c_str(), seed);
+  else
+    say("bin: %s%zu of %s, %zu of them over or under another, seed %llu", what, bin_.objects_left(), part.c_str(),
+        bin_.overlapping(), seed);
 }
 
 void Run::print_addresses() const {
@@ -169,7 +174,8 @@ int Run::run() {
     turn_devices(now);
     if (bin_.poll_refill()) {
       ++refills_;
-      say_bin("filled anew, ");
+      say_bin(bin_.is_belt() ? "moved on, " : "filled anew, ");
+      supply_changed_ = true;
     }
     if (plc_) turn_plc(now);
     if (robot_) turn_robot(now);
@@ -214,6 +220,7 @@ void Run::turn_plc(TimePoint now) {
       if ((!options_.requests && !pick_wanted_) || !plc.ready() || now < next_request_ || bin_.refilling()) return;
       if (robot_ && !robot_->device.clear_of_view()) return;
       plc.set_robot_clear(true);
+      plc.set_new_scan(std::exchange(supply_changed_, false));
       plc.raise_request(config_.recipes[options_.bin.recipe].id, config_.supplies[options_.bin.supply].id);
       pick_wanted_ = false;
       step_ = Step::Asked;
@@ -263,6 +270,8 @@ void Run::on_result(const PlcResult& result, TimePoint now) {
   if (result.code != ResultCode::SupplyEmpty && result.code != ResultCode::NothingFound &&
       result.code != ResultCode::NotReachable)
     return;
+  // A PLC moves its belt on when it is told that nothing is left: no fault of anybody.
+  if (bin_.objects_left() == 0 && options_.bin.objects > 0) return bin_.start_refill();
   ++without_pick_;
   // Once may be noise; twice in a row, this bin gives nothing any more.
   if (++without_pick_in_row_ >= 2 || bin_.objects_left() < kObjectsMin) bin_.start_refill();
@@ -310,7 +319,8 @@ void Run::finish_pick(std::uint16_t pick_id, const std::string& how, TimePoint n
     worst_mm_ = std::max(worst_mm_, pick.nearest->error.centroid_mm);
     worst_deg_ = std::max(worst_deg_, Angle::rad(pick.nearest->error.angle_rad).in_deg());
   }
-  say("pick %d: %s, %zu left in the bin", done_, verdict.line.c_str(), bin_.objects_left());
+  say("pick %d: %s, %zu left %s", done_, verdict.line.c_str(), bin_.objects_left(),
+      bin_.is_belt() ? "on the belt" : "in the bin");
   if (options_.cycles > 0 && done_ >= options_.cycles) return finish_as_counted();
   refill_when_low();
 }
@@ -324,6 +334,7 @@ void Run::finish_as_counted() {
 }
 
 void Run::refill_when_low() {
+  if (bin_.is_belt()) return;  // it moves on after the answer "empty"
   if (options_.cycles > 0 && bin_.objects_left() < kObjectsMin) bin_.start_refill();
   if (options_.cycles == 0 && bin_.objects_left() == 0) bin_.start_refill();
 }
@@ -456,9 +467,9 @@ std::string Run::summary() const {
   std::snprintf(
       text, sizeof text,
       "%d picks, %d right (within %.1f mm and %.1f deg; worst %.1f mm, %.1f deg), %d taken, %d answers without a pick, "
-      "bin filled anew %d times, %zu objects left",
+      "%s %d times, %zu objects left",
       done_, right_, options_.tolerance_mm, options_.tolerance_deg, worst_mm_, worst_deg_, taken_, without_pick_,
-      refills_, bin_.objects_left());
+      bin_.is_belt() ? "belt moved on" : "bin filled anew", refills_, bin_.objects_left());
   return text;
 }
 

@@ -90,6 +90,7 @@ class Run {
   TimePoint step_since_{}, next_request_{}, next_reset_{};
   std::uint16_t asked_boot_ = 0;  ///< Of the daemon that was asked.
   bool pick_wanted_ = false;
+  bool supply_changed_ = false;  ///< Since the last request: what was scanned does not hold.
   std::map<std::uint16_t, Pick> picks_;
   std::uint16_t picking_ = 0;
   std::uint16_t alarms_told_ = 0;

@@ -215,7 +215,7 @@ ExamplePart example_part(std::string_view name) {
   return part;
 }
 
-std::string write_example_part(std::string_view name, const std::string& folder) {
+std::string write_example_part(std::string_view name, const std::string& folder, vision::Picking picking) {
   const ExamplePart part = example_part(name);
   std::error_code failure;
   std::filesystem::create_directories(folder, failure);
@@ -226,6 +226,7 @@ std::string write_example_part(std::string_view name, const std::string& folder)
   std::ostringstream toml;
   toml << "# " << part.name << ", an example part. Symmetry: " << part.symmetry << ".\n"
        << "mesh = \"" << part.name << ".stl\"\nscanner = \"" << part.scanner << "\"\n";
+  if (picking == vision::Picking::Conveyor) toml << "picking = \"conveyor\"\n";
   const auto list = [](const Vector3d& v) {
     std::ostringstream text;
     text << '[' << v.x() << ", " << v.y() << ", " << v.z() << ']';

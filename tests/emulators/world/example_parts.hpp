@@ -7,6 +7,7 @@
 
 #include "vision/grasp.hpp"
 #include "vision/gripper.hpp"
+#include "vision/knowledge_base.hpp"
 #include "vision/mesh.hpp"
 
 /// The four parts that demo, tests and benches share, made here so that no mesh file has to be carried around.
@@ -54,7 +55,9 @@ const std::vector<std::string>& example_part_names();
 /// Any other name is a mistake of the caller.
 ExamplePart example_part(std::string_view name);
 
-/// Writes `folder`/NAME.stl (binary, mm) and `folder`/NAME.toml (a PART.toml). Makes the folder. Throws
-/// std::runtime_error with path and reason when a file cannot be written. Returns the path of the TOML.
-std::string write_example_part(std::string_view name, const std::string& folder);
+/// Writes `folder`/NAME.stl (binary, mm) and `folder`/NAME.toml (a PART.toml, for picking from a bin or from a belt).
+/// Makes the folder. Throws std::runtime_error with path and reason when a file cannot be written. Returns the path of
+/// the TOML.
+std::string write_example_part(std::string_view name, const std::string& folder,
+                               vision::Picking picking = vision::Picking::Bin);
 }  // namespace binpick::emulators

@@ -130,6 +130,23 @@ TEST_F(EmulatedBin, IsEmptiedFromAboveAndFilledAnew) {
   EXPECT_EQ(bin.seed(), 4U);
 }
 
+TEST_F(EmulatedBin, WithoutWallsObjectsLieByThemselvesOnABelt) {
+  config::Config config = *config_;
+  config.supplies[0].size_mm = {1500, 1000, 0};
+  Bin bin{config, {.objects = 4, .seed = 3}};
+  EXPECT_TRUE(bin.is_belt());
+  const std::size_t before = bin.objects_left();
+  EXPECT_GE(before, 2U);
+  EXPECT_LE(before, 4U);
+  EXPECT_EQ(bin.overlapping(), 0U);
+  const auto first = bin.world().objects().front().T_supply_object.iso.matrix();
+  bin.start_refill();
+  while (!bin.poll_refill()) continue;
+  EXPECT_NE(bin.world().objects().front().T_supply_object.iso.matrix(), first) << "the belt has moved on";
+  config.supplies[0].size_mm = {300, 300, 0};
+  EXPECT_THROW((Bin{config, {.objects = 4, .seed = 3}}), std::runtime_error) << "a wheel is 370 mm wide";
+}
+
 TEST(PickLine, GivesTheFiguresAndTheVerdict) {
   PickSeen seen;
   PlcResult result;
