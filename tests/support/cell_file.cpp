@@ -21,13 +21,13 @@ CellFile coarse_cell() {
 namespace {
 /// Where the supply is and how it is swept, by what the scanner can see.
 struct Layout {
-  const char* size_mm;
+  Eigen::Vector3d size_mm;
   int pivot_height_mm, sweep_deg;
 };
 Layout layout_of(const CellFile& file) {
   // To be located the supply's rim has to be seen, wherever it stands.
-  if (file.scanner == "lms400") return {"[1000, 800, 500]", 1860, file.locate ? 26 : 15};
-  return {"[300, 300, 120]", file.locate ? 800 : 560, file.locate ? 26 : 19};
+  if (file.scanner == "lms400") return {{1000, 800, file.belt ? 0.0 : 500.0}, 1860, file.locate ? 26 : 15};
+  return {{300, 300, file.belt ? 0.0 : 120.0}, file.locate ? 800 : 560, file.locate ? 26 : 19};
 }
 
 void write_scanner(std::ostream& out, const CellFile& file) {
@@ -64,8 +64,8 @@ std::string to_toml(const CellFile& file) {
     out << (file.robot == "ur" ? "pose_address" : "pose_listen") << " = \"127.0.0.1:" << file.pose_port
         << "\"\npose_latency_ms = " << file.pose_latency_ms << "\n";
   out << "\n[reach]\ntilt_max_deg = " << file.tilt_max_deg << "\n\n[detection]\nthreads = 2\ndeadline_ms = 4500\n\n"
-      << "[picks]\nper_scan = " << file.picks_per_scan
-      << "\n\n[[supply]]\nid = 1\nname = \"lattice box\"\nsize_mm = " << layout.size_mm << "\n"
+      << "[picks]\nper_scan = " << file.picks_per_scan << "\n\n[[supply]]\nid = 1\nname = \"lattice box\"\nsize_mm = ["
+      << layout.size_mm.x() << ", " << layout.size_mm.y() << ", " << layout.size_mm.z() << "]\n"
       << "T_base_supply = { xyz_mm = [1200, 0, 0], rpy_deg = [0, 0, 0] }\nlocate = " << (file.locate ? "true" : "false")
       << "\n";
   if (file.scan_path != 0)
@@ -80,14 +80,14 @@ std::string to_toml(const CellFile& file) {
         << "], rpy_deg = [0, 0, 0] }\nsweep_start_deg = 20\nsweep_end_deg = 38\nsweep_speed_deg_s = "
         << file.sweep_speed_deg_s << "\n";
   int id = 0;
+  const std::string folder = std::string{BINPICK_TEST_PARTS} + (file.belt ? "/belt/" : "/");
   for (const auto& part : file.parts) {
     ++id;
-    out << "\n[[part]]\nid = " << id << "\nfile = \"" << BINPICK_TEST_PARTS << "/" << part
-        << ".toml\"\nknowledge_base = \"";
+    out << "\n[[part]]\nid = " << id << "\nfile = \"" << folder << part << ".toml\"\nknowledge_base = \"";
     if (file.own_copies)
       out << "part" << id << ".kb";
     else
-      out << BINPICK_TEST_PARTS << "/" << part << ".kb";
+      out << folder << part << ".kb";
     out << "\"\nscore_min = " << file.score_min << "\n";
   }
   return out.str();

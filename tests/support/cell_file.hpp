@@ -30,6 +30,7 @@ struct CellFile {
   int detect_timeout_ms = 5000;
   int picks_per_scan = 1;
   bool locate = false;  ///< The first supply, by its rim.
+  bool belt = false;    ///< The supply has no walls, and the parts are trained for picking = "conveyor".
   std::string state_dir;
   std::string picture_dir;
   std::string record_dir;
