@@ -113,8 +113,8 @@ const Section<vision::Grasp>& grasp_section() {
                     "hold it from within, in a bore."},
            [](G& g) -> Slot { return &g.holding_mm; }},
           {{.name = "retreat_mm", .type = Number, .unit = "mm", .min = 0, .max = 5000, .default_value = "0",
-            .help = "The robot comes straight down to the approach pose and leaves it straight up; so far above it the "
-                    "way has to be free. 0: from above the walls, and all that was measured."},
+            .help = "The part is lifted straight up from the grasp; in a supply that stands slanted the way has to be "
+                    "free so far. 0: until it is out of the supply and over all that was measured."},
            [](G& g) -> Slot { return &g.retreat_mm; }},
           {{.name = "preference", .type = Number, .min = -100, .max = 100, .default_value = "0",
             .help = "Of the grasps of one object that are free, one with the highest value is taken; 0 for most."},

@@ -38,10 +38,14 @@ std::optional<PickMemory::Pick> PickMemory::next(const Place& place, const confi
   const auto touches = [&](std::size_t a, std::size_t b) {
     return a == b || vision::gap_mm(footprints[a], footprints[b]) < options.margin_mm;
   };
-  // What touched a picked object may have moved, and pushes what touches it.
+  // What touched a picked object may have moved, and with it what it lies on or leans on, from one to the next.
   std::vector<std::size_t> moved = scan.picked;
   for (std::size_t d = 0; d < footprints.size(); ++d)
     if (std::ranges::any_of(scan.picked, [&](std::size_t picked) { return touches(picked, d); })) moved.push_back(d);
+  for (std::size_t k = 0; k < moved.size(); ++k)
+    for (std::size_t d = 0; d < footprints.size(); ++d)
+      if (vision::gap_mm(footprints[moved[k]], footprints[d]) <= 0 && std::ranges::find(moved, d) == moved.end())
+        moved.push_back(d);
   const std::size_t left = scan.result.report.detections.size() - scan.picked.size() - 1;
   std::optional<Pick> again;
   for (std::size_t i = 0; i < scan.result.choice.reachable.size(); ++i) {
@@ -49,7 +53,9 @@ std::optional<PickMemory::Pick> PickMemory::next(const Place& place, const confi
     if (std::ranges::any_of(moved, [&](std::size_t d) { return touches(d, detection); })) continue;
     const int failures = failures_of(place, scan.result.centres_mm[detection]);
     if (failures == 0) return Pick{i, false, left};
-    if (fresh && failures < kPicksMax && !again) again = Pick{i, true, left};
+    // What was doubtful before it failed is no better the second time.
+    const int picks_max = scan.result.choice.reachable[i].covered_mm > 0 ? 1 : kPicksMax;
+    if (fresh && failures < picks_max && !again) again = Pick{i, true, left};
   }
   return again;
 }

@@ -153,10 +153,10 @@ Contact contact(const std::vector<Swept>& room, const Heights& heights, const Su
   return {};
 }
 
-Contact contact_of_part(const Template& lower_side, const Eigen::Vector2d& origin_mm, const Eigen::Vector3d& back,
+Contact contact_of_part(const Template& lower_side, const Eigen::Vector2d& origin_mm, const Eigen::Vector3d& up,
                         double way_mm, double slack_mm, const Heights& heights, const SupplyBox& supply) {
   Contact deepest;
-  const double aside_mm = way_mm * back.head<2>().norm();
+  const double aside_mm = way_mm * up.head<2>().norm();
   const auto steps = static_cast<int>(std::floor(aside_mm / heights.pixel_mm));
   if (steps == 0 || lower_side.rows == 0) return deepest;
   const bool walled = supply.size_mm.x() > 0 && supply.size_mm.y() > 0;
@@ -165,7 +165,7 @@ Contact contact_of_part(const Template& lower_side, const Eigen::Vector2d& origi
   // The place of the template's pixel (0, 0) in the window.
   const Eigen::Vector2d place = (origin_mm - heights.origin_mm) / heights.pixel_mm;
   for (int step = 1; step <= steps; ++step) {
-    const Eigen::Vector3d moved = back * (way_mm * step / steps);
+    const Eigen::Vector3d moved = up * (way_mm * step / steps);
     const auto rise = static_cast<float>(moved.z()) + slack;
     const int row0 = lower_side.row0 + static_cast<int>(std::lround(place.y() + moved.y() / heights.pixel_mm));
     const int col0 = lower_side.col0 + static_cast<int>(std::lround(place.x() + moved.x() / heights.pixel_mm));

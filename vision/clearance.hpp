@@ -6,11 +6,10 @@
 #include "vision/surroundings.hpp"
 #include "vision/swept.hpp"
 
-/// Whether gripper and held part pass through what stands around an object. As that is solid from its surface down,
-/// the way straight up from the approach pose is as free as the approach pose itself.
+/// Whether gripper and held part pass through what stands around an object.
 namespace binpick::vision {
-/// The room that a gripper takes up around one grasp: in with open jaws, closing (or opening within a bore), and back
-/// with the jaws as they hold. `T_a_tcp`: the tcp at the grasp, in any frame a.
+/// The room that a gripper takes up around one grasp: in with open jaws, and closing (or opening within a bore).
+/// `T_a_tcp`: the tcp at the grasp, in any frame a.
 std::vector<Swept> room_of(const Gripper& gripper, const Grasp& grasp, const Eigen::Isometry3d& T_a_tcp,
                            double grown_mm);
 /// What sweeps it, tcp frame: jaws as thick as they move, then the body.
@@ -29,8 +28,8 @@ Contact contact(const Swept& body, const Heights& heights, const SupplyBox& supp
 /// Of the first of them that has one.
 Contact contact(const std::vector<Swept>& room, const Heights& heights, const SupplyBox& supply);
 
-/// Of a part that is drawn back along `back` (length 1, up) for `way_mm`, from where `lower_side` was drawn on the
+/// Of a part that is lifted along `up` (length 1, up) for `way_mm`, from where `lower_side` was drawn on the
 /// picture with this origin. Contact that it has from the beginning does not count.
-Contact contact_of_part(const Template& lower_side, const Eigen::Vector2d& origin_mm, const Eigen::Vector3d& back,
+Contact contact_of_part(const Template& lower_side, const Eigen::Vector2d& origin_mm, const Eigen::Vector3d& up,
                         double way_mm, double slack_mm, const Heights& heights, const SupplyBox& supply);
 }  // namespace binpick::vision

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "vision/clearance.hpp"
+#include "vision/overlaps.hpp"
 
 namespace binpick::vision {
 namespace {
@@ -117,6 +118,8 @@ class Checks {
         around_{scene.image, supply, part_, report.detections, scene.noise_mm},
         holes_{limits.unmeasured == Unmeasured::Blocked},
         highest_mm_{static_cast<double>(around_.highest_mm())},
+        overlaps_mm_{vision::overlaps_mm(part_, report.detections, scene.image.pixel_mm / 3)},
+        up_{limits.T_base_supply.iso.linear().transpose() * Eigen::Vector3d::UnitZ()},
         hits_part_(grasps.size()) {
     for (const Grasp& grasp : grasps) sweepers_.push_back(sweepers_of(scene.gripper, grasp));
   }
@@ -139,7 +142,7 @@ class Checks {
     const Eigen::Vector2d margin = Eigen::Vector2d::Constant(0.4 * std::min(highest_mm_, kHiddenMm));
     heights_ = around_.without(detection, {window.min() - margin, window.max() + margin});
     lower_side_.reset();
-    covered_ = around_.covered_pixels(detection);
+    covered_mm_ = std::max(overlaps_mm_[detection], around_.covered_mm(detection));
   }
 
   /// None: it is free, with `clearance_mm` around it.
@@ -153,22 +156,23 @@ class Checks {
       found.why = Obstacle::Itself;
       return found;
     }
-    if (covered_ > kCoveredPx) {
+    if (covered_mm_ > kCoveredMaxNoises * scene_.noise_mm) {
       found.why = Obstacle::Covered;
-      found.value = covered_ * scene_.image.pixel_mm * scene_.image.pixel_mm;
+      found.value = covered_mm_;
       return found;
     }
     if (const Contact hit = contact_of_gripper(candidate, 1, holes_); hit.with != Obstacle::None) {
       found.why = hit.with, found.value = hit.depth_mm;
       return found;
     }
-    if (!lower_side_) lower_side_ = around_.lower_side(detection_);
-    const Contact hit = contact_of_part(*lower_side_, scene_.image.origin_mm, -candidate.T_supply_tcp.linear().col(2),
-                                        grasp.approach_mm, kSlackNoises * scene_.noise_mm, heights_, supply_);
-    if (hit.with != Obstacle::None) {
-      found.why = hit.with, found.value = hit.depth_mm;
-      return found;
-    }
+    if (slants_ && !lower_side_) lower_side_ = around_.lower_side(detection_);
+    if (slants_)
+      if (const Contact hit = contact_of_part(*lower_side_, scene_.image.origin_mm, up_, lift_mm(grasp),
+                                              kSlackNoises * scene_.noise_mm, heights_, supply_);
+          hit.with != Obstacle::None) {
+        found.why = hit.with, found.value = hit.depth_mm;
+        return found;
+      }
     // Here what may stand in a hole counts in any case: if it is allowed, it is still the last choice.
     for (const double times : kRoom)
       if ((times == 1 && holes_) || contact_of_gripper(candidate, times, true).with == Obstacle::None) {
@@ -177,31 +181,42 @@ class Checks {
       }
     return found;
   }
+  /// How far others may reach over the detection; 0: hardly.
+  double covered_mm() const { return covered_mm_ > kCoveredNoises * scene_.noise_mm ? covered_mm_ : 0; }
+  bool is_tight(double clearance_mm) const { return clearance_mm <= clearance_mm_; }
   bool is_roomy(double clearance_mm) const { return clearance_mm >= kRoom.front() * clearance_mm_; }
 
  private:
   /// Something that a shadow hides deeper than this is not met by jaws.
   static constexpr double kHiddenMm = 100;
-  /// Pixels on an object that may be wrong.
-  static constexpr int kCoveredPx = 1;
   static constexpr double kSlackNoises = 1;
+  /// What reaches farther over an object lies on it, and would be lifted with it; from the lesser width on it may.
+  static constexpr double kCoveredMaxNoises = 2, kCoveredNoises = 0.3;
 
-  Eigen::Vector3d way_of(const Candidate& candidate) const {
+  /// From the approach pose, seen from the grasp, and what the arm lifts.
+  Eigen::Vector3d way_in(const Candidate& candidate) const {
     return -grasps_[candidate.grasp].approach_mm * candidate.T_supply_tcp.linear().col(2);
+  }
+  double lift_mm(const Grasp& grasp) const {
+    return grasp.retreat_mm > 0 ? grasp.retreat_mm : std::max(highest_mm_, supply_.size_mm.z()) / up_.z();
   }
   Eigen::AlignedBox3d box_of(const Gripper::Solid& solid, const Candidate& candidate, double times) const {
     const Eigen::Isometry3d T = candidate.T_supply_tcp * solid.T_tcp_solid;
     const Eigen::Vector3d half = T.linear().cwiseAbs() * (0.5 * solid.size_mm.array() + times * clearance_mm_).matrix();
-    Eigen::AlignedBox3d box{T.translation() - half, T.translation() + half};
-    const Eigen::AlignedBox3d begin = box.translated(way_of(candidate));
-    return box.extend(begin);
+    const Eigen::AlignedBox3d end{T.translation() - half, T.translation() + half};
+    Eigen::AlignedBox3d box = end.merged(end.translated(way_in(candidate)));
+    if (slants_) box.extend(end.translated(lift_mm(grasps_[candidate.grasp]) * up_));
+    return box;
   }
   /// The first that is found: jaws are asked before the body.
   Contact contact_of_gripper(const Candidate& candidate, double times, bool holes) const {
     for (const Gripper::Solid& solid : sweepers_[candidate.grasp]) {
       if (box_of(solid, candidate, times).min().z() >= std::max(highest_mm_, supply_.size_mm.z())) continue;
-      const Swept body{solid, candidate.T_supply_tcp, way_of(candidate), times * clearance_mm_};
-      if (const Contact found = contact(body, heights_, supply_, holes); found.with != Obstacle::None) return found;
+      const Swept in{solid, candidate.T_supply_tcp, way_in(candidate), times * clearance_mm_};
+      if (const Contact found = contact(in, heights_, supply_, holes); found.with != Obstacle::None) return found;
+      if (!slants_) continue;
+      const Swept out{solid, candidate.T_supply_tcp, lift_mm(grasps_[candidate.grasp]) * up_, times * clearance_mm_};
+      if (const Contact found = contact(out, heights_, supply_, holes); found.with != Obstacle::None) return found;
     }
     return {};
   }
@@ -215,12 +230,16 @@ class Checks {
   Surroundings around_;
   bool holes_;  ///< Block the way.
   double highest_mm_;
+  std::vector<double> overlaps_mm_;  ///< Of each detection: how far others reach over it.
+  Eigen::Vector3d up_;               ///< The arm's way out.
+  /// Where the supply stands level, a way straight up is as free as its beginning: all is solid from its surface down.
+  bool slants_ = up_.head<2>().norm() > 1e-3;
   std::vector<std::vector<Gripper::Solid>> sweepers_;  ///< Of each grasp.
   std::vector<std::optional<bool>> hits_part_;
   std::size_t detection_ = 0;
   Heights heights_;
   std::optional<Template> lower_side_;
-  int covered_ = 0;
+  double covered_mm_ = 0;
 };
 
 /// Of a normal error, in the direction in which it is largest.
@@ -304,6 +323,10 @@ GraspChoice choose_grasps(const DetectionReport& report, const Symmetry& symmetr
                          clearance_mm};
       if (!checks || checks->is_roomy(clearance_mm)) break;
     }
+    if (best && checks) {
+      best->covered_mm = checks->covered_mm();
+      best->is_tight = checks->is_tight(best->clearance_mm);
+    }
     if (best)
       choice.reachable.push_back(*best);
     else
@@ -313,6 +336,8 @@ GraspChoice choose_grasps(const DetectionReport& report, const Symmetry& symmetr
   for (const Detection& d : report.detections)
     holds.push_back(std::lround(probability_of_holding(d, symmetry) / kProbabilityStep));
   std::stable_sort(choice.reachable.begin(), choice.reachable.end(), [&](const Reachable& a, const Reachable& b) {
+    if (a.covered_mm != b.covered_mm) return a.covered_mm < b.covered_mm;
+    if (a.is_tight != b.is_tight) return b.is_tight;
     if (holds[a.detection] != holds[b.detection]) return holds[a.detection] > holds[b.detection];
     if (grasps[a.grasp].preference != grasps[b.grasp].preference)
       return grasps[a.grasp].preference > grasps[b.grasp].preference;
@@ -347,7 +372,7 @@ std::string to_string(const RejectedGrasp& rejected) {
     case Obstacle::Itself:
       return "the gripper hits the part itself on its way in; correct opening_mm, T_object_tcp or the gripper";
     case Obstacle::Covered:
-      return say("something lies on it, on %.0f mm2", rejected.value);
+      return say("something lies on it, %.1f mm wide", rejected.value);
     case Obstacle::Floor:
       return say("gripper %.1f mm too near to the floor", rejected.value);
     case Obstacle::Neighbour:

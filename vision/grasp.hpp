@@ -19,7 +19,7 @@ struct Grasp {
   std::optional<double> opening_mm;
   /// Between the jaws when they hold the part. Wider than on the way in: they hold it from within, in a bore.
   std::optional<double> holding_mm;
-  /// Straight up from the approach pose, the way in and out is free so far. 0: out of the supply.
+  /// The part is lifted straight up (z of the base) from the grasp, and has to pass so far. 0: out of the supply.
   double retreat_mm = 0;
   double preference = 0;  ///< Of an object's grasps that are free, one with the highest value is taken.
 };
@@ -39,6 +39,8 @@ struct Reachable {
   Transform<frame::Supply, frame::Tcp> T_supply_grasp;
   Transform<frame::Supply, frame::Tcp> T_supply_approach;
   double clearance_mm = 0;  ///< So much room is all around; 0: nobody asked, or only where holes are free.
+  double covered_mm = 0;    ///< So far another one may reach over it: it would be lifted with it.
+  bool is_tight = false;    ///< Hardly more room than the clearance.
 };
 /// A grasp in one of the poses that the symmetry allows, and why it is not offered.
 struct RejectedGrasp {
@@ -57,8 +59,9 @@ struct Unreachable {
   std::string reason;  ///< "tilt 51 deg is over 40 deg", "tcp 12 mm outside the wall x max".
 };
 struct GraspChoice {
-  /// At most one per detection, best first: the surest to hold (in steps of 0.02), then the preferred grasp, then the
-  /// one with more room around it (up to four times the clearance), then the highest.
+  /// At most one per detection, best first. Objects that another one may lie on come last, before them those with
+  /// hardly more room than the clearance. Else the surest to hold (in steps of 0.02), then the preferred grasp, then
+  /// the one with more room around it (up to four times the clearance), then the highest.
   std::vector<Reachable> reachable;
   /// Detections without any reachable grasp, with the reason of the best one of those that got farthest in the tests.
   std::vector<Unreachable> unreachable;

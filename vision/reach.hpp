@@ -22,7 +22,7 @@ struct ReachLimits {
   Unmeasured unmeasured = Unmeasured::Blocked;
   double radius_max_mm = 0;  ///< Of the tcp from the origin of the robot's base; 0: no limit.
   double axis_min_mm = 0;    ///< Of the tcp from the z axis of the robot's base.
-  Transform<frame::Base, frame::Supply> T_base_supply = {};  ///< For these two.
+  Transform<frame::Base, frame::Supply> T_base_supply = {};  ///< For these two, and for what is up.
 };
 
 /// Why a grasp is not offered. The order is that of the tests; the values are the PLC's (register unreachable_reason).

@@ -155,21 +155,31 @@ float Surroundings::highest_mm() const {
   return highest;
 }
 
-int Surroundings::covered_pixels(std::size_t detection) const {
+double Surroundings::covered_mm(std::size_t detection) const {
   const Template& drawn = drawn_[detection];
-  int pixels = 0;
-  for (int r = std::max(0, -drawn.row0); r < drawn.rows && r + drawn.row0 < owner_.rows(); ++r)
-    for (int c = std::max(0, -drawn.col0); c < drawn.cols && c + drawn.col0 < owner_.cols(); ++c) {
-      const int row = r + drawn.row0, col = c + drawn.col0;
-      const float z = measured_mm_(row, col);
-      if (std::isnan(z) || owner_(row, col) == static_cast<std::int16_t>(detection) ||
-          std::isnan(drawn.top_mm[drawn.at(r, c)]))
-        continue;
-      const Around near = around(drawn, r, c);
-      // On the silhouette itself a neighbour at its side looks the same.
-      if (near.inner && z > near.greatest + static_cast<float>(kCoversNoises * noise_mm_)) ++pixels;
+  // The largest square that ends at each pixel, row by row.
+  std::vector<int> before(static_cast<std::size_t>(drawn.cols) + 1, 0), now = before;
+  int largest = 0;
+  for (int r = 0; r < drawn.rows; ++r) {
+    for (int c = 0; c < drawn.cols; ++c) {
+      const auto at = static_cast<std::size_t>(c);
+      now[at + 1] = covers(detection, r, c) ? 1 + std::min({before[at], before[at + 1], now[at]}) : 0;
+      largest = std::max(largest, now[at + 1]);
     }
-  return pixels;
+    std::swap(before, now);
+  }
+  return pixel_mm_ * std::max(0, largest - 1);
+}
+
+bool Surroundings::covers(std::size_t detection, int r, int c) const {
+  const Template& drawn = drawn_[detection];
+  const int row = r + drawn.row0, col = c + drawn.col0;
+  if (row < 0 || col < 0 || row >= owner_.rows() || col >= owner_.cols()) return false;
+  const float z = measured_mm_(row, col);
+  if (std::isnan(z) || owner_(row, col) >= 0 || std::isnan(drawn.top_mm[drawn.at(r, c)])) return false;
+  const Around near = around(drawn, r, c);
+  // On the silhouette itself a neighbour at its side looks the same.
+  return near.inner && z > near.greatest + static_cast<float>(kCoversNoises * noise_mm_);
 }
 
 Template Surroundings::lower_side(std::size_t detection) const {
@@ -190,16 +200,20 @@ Template Surroundings::lower_side(std::size_t detection) const {
 }
 
 Heights Surroundings::without(std::size_t detection, const DepthWindow& window) const {
-  const auto first = [&](double at, double origin, Eigen::Index count) {
-    return static_cast<int>(
-        std::clamp(std::floor((at - origin) / pixel_mm_), 0.0, static_cast<double>(std::max<Eigen::Index>(0, count))));
+  // Beyond the object to all sides, or what it hides would be filled from one side alone.
+  const Template& drawn = drawn_[detection];
+  constexpr int kAroundPx = kRimPx + 2;
+  const auto first = [&](double at, double origin, double least, double greatest, Eigen::Index count) {
+    const double px = std::clamp(std::floor((at - origin) / pixel_mm_), least, greatest);
+    return static_cast<int>(std::clamp(px, 0.0, static_cast<double>(std::max<Eigen::Index>(0, count))));
   };
-  const int col0 = first(window.min_mm.x(), origin_mm_.x(), owner_.cols());
-  const int row0 = first(window.min_mm.y(), origin_mm_.y(), owner_.rows());
-  const int cols = std::max(
-      0, std::min(static_cast<int>(owner_.cols()), first(window.max_mm.x(), origin_mm_.x(), owner_.cols()) + 2) - col0);
-  const int rows = std::max(
-      0, std::min(static_cast<int>(owner_.rows()), first(window.max_mm.y(), origin_mm_.y(), owner_.rows()) + 2) - row0);
+  constexpr double kFar = std::numeric_limits<double>::infinity();
+  const int col0 = first(window.min_mm.x(), origin_mm_.x(), -kFar, drawn.col0 - kAroundPx, owner_.cols());
+  const int row0 = first(window.min_mm.y(), origin_mm_.y(), -kFar, drawn.row0 - kAroundPx, owner_.rows());
+  const int col1 = first(window.max_mm.x(), origin_mm_.x(), drawn.col0 + drawn.cols + kAroundPx, kFar, owner_.cols());
+  const int row1 = first(window.max_mm.y(), origin_mm_.y(), drawn.row0 + drawn.rows + kAroundPx, kFar, owner_.rows());
+  const int cols = std::max(0, std::min(static_cast<int>(owner_.cols()), col1 + 2) - col0);
+  const int rows = std::max(0, std::min(static_cast<int>(owner_.rows()), row1 + 2) - row0);
   Heights heights;
   heights.pixel_mm = pixel_mm_;
   heights.origin_mm = origin_mm_ + pixel_mm_ * Eigen::Vector2d(col0, row0);
@@ -221,7 +235,6 @@ Heights Surroundings::without(std::size_t detection, const DepthWindow& window) 
     }
 
   // Its edge, where heights are mixed, and what lies lower within its outline: none of it is a neighbour.
-  const Template& drawn = drawn_[detection];
   for (int r = -kRimPx; r < drawn.rows + kRimPx; ++r)
     for (int c = -kRimPx; c < drawn.cols + kRimPx; ++c) {
       const int row = r + drawn.row0 - row0, col = c + drawn.col0 - col0;

@@ -40,8 +40,8 @@ class Surroundings {
   /// Of the window, which is cut to the picture.
   Heights without(std::size_t detection, const DepthWindow& window) const;
   float highest_mm() const;
-  /// Pixels of a detection above which something else lies.
-  int covered_pixels(std::size_t detection) const;
+  /// Side of the largest square of a detection, less a pixel, above which something lies that was not found.
+  double covered_mm(std::size_t detection) const;
   /// Its lower side: drawn like its upper one, from below.
   Template lower_side(std::size_t detection) const;
 
@@ -52,6 +52,7 @@ class Surroundings {
     bool inner;
   };
   static Around around(const Template& drawn, int row, int col);
+  bool covers(std::size_t detection, int row, int col) const;  ///< Pixel of its template.
   void forget_walls(const SupplyBox& supply);
   void claim(std::size_t detection, Grid<float>& misfit_mm);
   void fill(Heights& heights) const;

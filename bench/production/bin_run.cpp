@@ -114,6 +114,12 @@ class BinRun {
     if (!kept) throw std::runtime_error(kept.error());
   }
 
+  static std::string reasons(const daemon::DetectResult& seen) {
+    std::string all;
+    for (const auto& each : seen.choice.unreachable) all += (all.empty() ? "" : "; ") + each.reason;
+    return all;
+  }
+
   void ask(RequestRecord& record) {
     record.left_before = static_cast<int>(pile_.world().objects().size());
     record_ = &record;
@@ -137,6 +143,7 @@ class BinRun {
         record.first_hypotheses = seen.report.first->hypotheses;
       }
       if (supply_.locate && record.scanned) judge_place(seen, record);
+      if (record.answer == "not_reachable") record.why = reasons(seen);
     }
     if (trials_.faults.every() > 0) find_cause(record);
     is_after_fault_ = record.fault && record.fault->reached;

@@ -86,7 +86,9 @@ void produce(const ProductionPart& part, std::size_t number, const Arguments& ar
                     r.fault->reached ? "" : " (never)", r.answer.c_str(), r.fault->alarms.c_str(),
                     r.fault->recovered_s);
     for (const RequestRecord& r : outcome.requests)
-      if (arguments.talks && r.answer == "pick" && r.grip != "taken")
+      if (arguments.talks && r.answer == "not_reachable")
+        std::printf("  request %d: %s\n", r.request, r.why.c_str());
+      else if (arguments.talks && r.answer == "pick" && r.grip != "taken")
         std::printf("  request %d, %s, error %.1f mm %.1f deg: %s\n", r.request, r.grasp.c_str(), r.error_mm,
                     r.error_deg, r.why.c_str());
     std::fflush(stdout);

@@ -29,7 +29,7 @@ struct RequestRecord {
   double error_mm = 0, error_deg = 0;  ///< Of a pick: to the nearest true object.
   bool wrong = false;                  ///< Beyond the class's limit.
   std::string grip;                    ///< "taken", "missed", "collision"; empty: no pick, or the robot never closed.
-  std::string why;                     ///< Of a grip that failed, in words.
+  std::string why;                     ///< Of a grip that failed, or of "not_reachable", in words.
   std::string grasp;                   ///< The nearest one's name.
   bool retry = false;                  ///< An object that was failed on before.
   double score = 0;

@@ -101,8 +101,9 @@ void track_link(ExamplePart& part) {
         for (const double lean : lug.leans) {
           const Vector3d jaws = std::cos(turn * kDegree) * kX + std::sin(turn * kDegree) * kY;
           const Vector3d way = -side * std::cos(lean * kDegree) * kZ + std::sin(lean * kDegree) * kZ.cross(jaws);
-          // A flat jaw touches the round wall beside its middle line.
-          const double beside = kJaw.y() / 2 + 10 * std::tan(std::abs(lean) * kDegree);
+          // A flat jaw touches the round wall with its corners, 10 mm above and below its middle.
+          const double slant = std::abs(lean) * kDegree;
+          const double beside = kJaw.y() / 2 * std::cos(slant) + 10 * std::sin(slant);
           const double holding = 2 * (std::sqrt(lug.bore_mm * lug.bore_mm - beside * beside) - kJaw.x());
           part.grasps.push_back(grasp(std::string{lug.name} + (side > 0 ? "_bore_top_" : "_bore_bottom_") +
                                           degrees(turn) + (lean == 0 ? "" : "_" + degrees(lean)),
@@ -151,6 +152,7 @@ void contact_bridge(ExamplePart& part) {
     const std::string name = end < 0 ? "left" : "right";
     add(name + "_top", block - 2 * kZ, -kZ, kY, 18);
     add(name + "_bottom", block + 2 * kZ, kZ, kY, 18);
+    add(name + "_bottom_in", block + kZ, kZ, kX, 12);
     for (const double side : {-1.0, 1.0}) {
       add(name + (side < 0 ? "_below" : "_above"), block + side * 1.5 * kY, -side * kY, kZ, 12);
       add(name + (side < 0 ? "_below_in" : "_above_in"), block + side * 1.5 * kY - 2 * kZ, -side * kY, kX, 12);

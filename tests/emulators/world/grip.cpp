@@ -259,7 +259,7 @@ GripRules GripRules::of(const ExamplePart& part) {
 
 std::optional<Closed> closed_on(const RayMesh& part, const Gripper& gripper, const Grasp& grasp,
                                 const GripRules& rules) {
-  return close_jaws(gripper, grasp, {{1, &part, grasp.T_object_tcp.iso}}, 1, rules).closed;
+  return close_and_centre(gripper, grasp, {{1, &part, grasp.T_object_tcp.iso}}, 1, rules).closed;
 }
 
 bool stands_free(const World& world, const Gripper& gripper, const Grasp& grasp, const TcpPose& T_supply_grasp,
@@ -324,29 +324,20 @@ GripResult grip(const LivingPile& pile, const Gripper& gripper, const std::vecto
 
   // 3. Out.
   const std::vector<Gripper::Solid> holding = vision::solids_of(gripper, closed.jaws_mm);
-  const auto retreat = line(motion.T_supply_grasp, motion.T_supply_approach, rules.step_mm);
-  TcpPose far_up = above;
-  far_up.iso.translation().z() = std::max(
-      far_up.iso.translation().z(), motion.T_supply_approach.iso.translation().z() + top_of(world) -
-                                        (double{target.box.min().z()} + motion.T_supply_approach.iso.translation().z() -
-                                         motion.T_supply_grasp.iso.translation().z()));
-  const auto up = line(motion.T_supply_approach, far_up, rules.step_mm);
-  for (const auto& [phase, way] : {std::pair{Phase::Retreat, &retreat}, std::pair{Phase::Up, &up}})
-    if (const auto hit = first_hit(world, holding, gripper.body.size(), *way, result.object, rules.hit_mm))
-      return collided(result, phase, *hit, *way, motion.T_supply_grasp);
+  TcpPose out = motion.T_supply_grasp;
+  const double gripper_above = above.iso.translation().z() - out.iso.translation().z();
+  out.iso.translation().z() += std::max(gripper_above, top_of(world) - double{target.box.min().z()});
+  const auto up = line(motion.T_supply_grasp, out, rules.step_mm);
+  if (const auto hit = first_hit(world, holding, gripper.body.size(), up, result.object, rules.hit_mm))
+    return collided(result, Phase::Up, *hit, up, motion.T_supply_grasp);
 
   std::vector<LivingPile::Pose> carried{target.T_supply_object};
-  std::vector<TcpPose> tcp{motion.T_supply_grasp};
   const Isometry3d T_tcp_object = Eigen::Translation3d(closed.off_middle_mm, closed.across_mm, 0) *
                                   (motion.T_supply_grasp.iso.inverse() * target.T_supply_object.iso);
-  for (const auto* way : {&retreat, &up})
-    for (const TcpPose& T_supply_tcp : *way) {
-      carried.push_back({T_supply_tcp.iso * T_tcp_object});
-      tcp.push_back(T_supply_tcp);
-    }
+  for (const TcpPose& T_supply_tcp : up) carried.push_back({T_supply_tcp.iso * T_tcp_object});
   if (const auto push = pile.first_push(result.object, carried, rules.push_mm))
-    return collided(result, push->pose <= retreat.size() ? Phase::Retreat : Phase::Up,
-                    {"held object", push->object, push->depth_mm, push->pose}, tcp, motion.T_supply_grasp);
+    return collided(result, Phase::Up, {"held object", push->object, push->depth_mm, push->pose - 1}, up,
+                    motion.T_supply_grasp);
   result.kind = Kind::Taken;
   result.phase = Phase::Up;
   result.what.clear();
@@ -373,8 +364,6 @@ std::string to_string(Phase phase) {
       return "on the approach";
     case Phase::Close:
       return "while closing";
-    case Phase::Retreat:
-      return "on the retreat";
     case Phase::Up:
       return "on the way up";
   }

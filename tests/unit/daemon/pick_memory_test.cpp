@@ -59,6 +59,13 @@ TEST_F(PickMemoryTest, WhatTouchesANeighbourOfAPickedOneMayHaveMoved) {
   EXPECT_EQ(pick(), std::nullopt);
 }
 
+TEST_F(PickMemoryTest, WhatLiesOnSomethingMovesWithIt) {
+  scan({0, 75, 22, 37, 52, 110});  // 22 touches the picked one, 37 and 52 lie on it and on each other, 75 beside them
+  EXPECT_EQ(pick(), 0);
+  EXPECT_EQ(pick(), 5);
+  EXPECT_EQ(pick(), std::nullopt);
+}
+
 TEST_F(PickMemoryTest, NoMoreThanItIsAllowed) {
   options.per_scan = 1;
   scan({0, 100});
@@ -112,6 +119,19 @@ TEST_F(PickMemoryTest, WhatFailedTwiceIsLeftAloneUntilItIsForgotten) {
   }
   scan({0});
   EXPECT_EQ(pick(), 0);
+}
+
+TEST_F(PickMemoryTest, WhatAnotherOneMayLieOnIsTriedOnce) {
+  DetectResult result = scan_of({0});
+  result.choice.reachable[0].covered_mm = 1;
+  memory.keep(kPlace, result, kScanned);
+  EXPECT_EQ(pick(), 0);
+  fail();
+  memory.keep(kPlace, result, kScanned);
+  EXPECT_EQ(pick(), std::nullopt);
+  result.choice.reachable[0].covered_mm = 0;
+  memory.keep(kPlace, result, kScanned);
+  EXPECT_EQ(pick(), 0) << "nothing may lie on it any more";
 }
 
 TEST_F(PickMemoryTest, WithoutMemoryTheSameOneIsTriedAgainAndAgain) {

@@ -277,21 +277,52 @@ TEST(Clearance, ATiltedWayIsFreeAlongAllOfIt) {
   EXPECT_EQ(table.why_not(short_way, usual(), wide), Obstacle::None);
 }
 
-TEST(Clearance, TheHeldPartMustPass) {
-  // Drawn back along a tilted way, the bar's end meets a post that the gripper itself passes by.
+TEST(Clearance, InASlantedSupplyTheHeldPartMustPass) {
+  // Lifted straight up, which is aslant in the supply, the bar's end meets a post that the gripper itself passes by.
   Table table{bar()};
   table.lay({0, 0, 10});
-  Grasp tilted = across_bar();
-  tilted.T_object_tcp.iso.linear() =
-      Eigen::AngleAxisd(kPi / 6, Vector3d::UnitY()).toRotationMatrix() * tilted.T_object_tcp.iso.linear();
   Gripper slim = two_jaws();
   slim.body.clear();
-  EXPECT_EQ(table.why_not(tilted, usual(), slim), Obstacle::None);
-  const double side =
-      -(table.report.detections[0].T_supply_object.iso * tilted.T_object_tcp.iso).linear()(0, 2) > 0 ? 1 : -1;
-  table.lay_block(side > 0 ? 34 : -38, side > 0 ? 38 : -34, -9, 9, 45);
-  EXPECT_EQ(table.why_not(tilted, usual(), slim), Obstacle::Neighbour);
-  EXPECT_EQ(table.why_not(across_bar(), usual(), slim), Obstacle::None);
+  ReachLimits slanted = usual();
+  slanted.T_base_supply.iso.linear() = Eigen::AngleAxisd(-kPi / 6, Vector3d::UnitY()).toRotationMatrix();
+  EXPECT_EQ(table.why_not(across_bar(), slanted, slim), Obstacle::None);
+  table.lay_block(34, 38, -9, 9, 45);
+  EXPECT_EQ(table.why_not(across_bar(), slanted, slim), Obstacle::Neighbour);
+  EXPECT_EQ(table.why_not(across_bar(), usual(), slim), Obstacle::None) << "level, it passes";
+  // So far and no farther it has to pass.
+  Grasp little = across_bar();
+  little.retreat_mm = 5;
+  EXPECT_EQ(table.why_not(little, slanted, slim), Obstacle::None);
+}
+
+TEST(Clearance, InASlantedSupplyTheGripperMustPassOnTheWayOut) {
+  Table table{bar()};
+  table.lay({0, 0, 10});
+  ReachLimits slanted = usual();
+  slanted.T_base_supply.iso.linear() = Eigen::AngleAxisd(-kPi / 6, Vector3d::UnitY()).toRotationMatrix();
+  EXPECT_EQ(table.why_not(across_bar(), slanted), Obstacle::None);
+  table.lay_block(20, 60, -60, -14, 36);  // beside the bar's way, under the palm
+  EXPECT_EQ(table.why_not(across_bar(), slanted), Obstacle::Neighbour);
+  EXPECT_EQ(table.why_not(across_bar()), Obstacle::None);
+}
+
+TEST(Clearance, WhatMayLieUnderAnotherOneGoesLast) {
+  // The second bar lies across the first one's end and reaches over it by a hair; the third lies alone, lower.
+  Table table{bar()};
+  table.lay({0, 0, 30});
+  table.lay({40 - 0.2, 0, 50}, kPi / 2);
+  table.lay({0, 85, 10});
+  GraspChoice choice = table.choose({across_bar()});
+  ASSERT_EQ(choice.reachable.size(), 3U) << choice.unreachable.front().reason;
+  EXPECT_EQ(choice.reachable.back().detection, 0U);
+  EXPECT_NEAR(choice.reachable.back().covered_mm, 0.2, 0.2);
+  EXPECT_EQ(choice.reachable.front().covered_mm, 0);
+  // A little more, and it lies on it for sure.
+  table.report.detections[1].T_supply_object.iso.translation().x() -= 1;
+  choice = table.choose({across_bar()});
+  ASSERT_EQ(choice.unreachable.size(), 1U);
+  EXPECT_EQ(choice.unreachable[0].why, Obstacle::Covered);
+  EXPECT_NE(choice.unreachable[0].reason.find("mm wide"), std::string::npos) << choice.unreachable[0].reason;
 }
 
 TEST(Clearance, AGripFromWithinABore) {
