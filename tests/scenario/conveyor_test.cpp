@@ -95,10 +95,10 @@ TEST_P(Conveyor, EveryObjectIsTakenFromTheStillBelt) {
   EXPECT_LT(cell.sweeps(), static_cast<std::uint64_t>(lay) + 2) << "two of them show that no object is left";
 }
 
-// Of 399 objects (seeds 1 to 10) 396 are taken, none of them at the second try. The other three are contact bridges of
-// which a few pixels too high are taken for something that lies on them (seeds 1, 3 and 6).
+// Seed 3 finds room for a single steering wheel only.
 INSTANTIATE_TEST_SUITE_P(Parts, Conveyor,
-                         testing::Combine(testing::ValuesIn(emulators::example_part_names()), testing::Values(2, 4, 5)),
+                         testing::Combine(testing::ValuesIn(emulators::example_part_names()),
+                                          testing::Values(1, 2, 4, 5, 6)),
                          [](const auto& one) {
                            return std::get<0>(one.param) + "_" + std::to_string(std::get<1>(one.param));
                          });
