@@ -296,13 +296,13 @@ void Cell::publish(TimePoint now) {
     answer.objects_left = to_u16(static_cast<double>(pick->left));
     answer.score = scan.report.detections[grasp.detection].score;
     const Transform<frame::Base, frame::Supply> T_base_supply{supply.T_base_supply.iso * scan.place.T_said_found};
-    answer.T_base_approach = T_base_supply * grasp.T_supply_approach;
-    answer.T_base_grasp = T_base_supply * grasp.T_supply_grasp;
+    answer.T_base_approach = T_base_supply * (pick->other ? grasp.other->T_supply_approach : grasp.T_supply_approach);
+    answer.T_base_grasp = T_base_supply * (pick->other ? grasp.other->T_supply_grasp : grasp.T_supply_grasp);
     memory_.answered(place(), *pick, pick_id_, data_->config.picks);
     unfetched_since_ = new_scan ? std::optional{last_profile_at_} : std::nullopt;
     if (pick->again)
-      BINPICK_LOG(Info, "cell", "pick %u is a second try: a pick of object %zu failed before", pick_id_,
-                  grasp.detection);
+      BINPICK_LOG(Info, "cell", "pick %u is a second try: a pick of object %zu failed before%s", pick_id_,
+                  grasp.detection, pick->other ? "; by another grasp now" : "");
     robot_.offer({answer.pick_id, request_.sequence, request_.part_id, answer.objects_left, answer.T_base_approach,
                   answer.T_base_grasp});
   } else {

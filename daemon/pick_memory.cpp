@@ -16,12 +16,13 @@ void PickMemory::keep(const Place& place, DetectResult result, TimePoint scanned
   std::erase_if(failures, [](Failure& failure) { return failure.scans_left-- <= 0; });
 }
 
-int PickMemory::failures_of(const Place& place, const Eigen::Vector3d& centre_mm) const {
+const PickMemory::Failure* PickMemory::failure_of(const Place& place, const Eigen::Vector3d& centre_mm) const {
   const auto known = failures_.find(place);
-  if (known == failures_.end()) return 0;
-  int most = 0;
+  if (known == failures_.end()) return nullptr;
+  const Failure* most = nullptr;
   for (const Failure& failure : known->second)
-    if ((failure.centre_mm - centre_mm).norm() < failure.radius_mm) most = std::max(most, failure.picks);
+    if ((failure.centre_mm - centre_mm).norm() < failure.radius_mm && (most == nullptr || failure.picks > most->picks))
+      most = &failure;
   return most;
 }
 
@@ -51,22 +52,25 @@ std::optional<PickMemory::Pick> PickMemory::next(const Place& place, const confi
   for (std::size_t i = 0; i < scan.result.choice.reachable.size(); ++i) {
     const std::size_t detection = scan.result.choice.reachable[i].detection;
     if (std::ranges::any_of(moved, [&](std::size_t d) { return touches(d, detection); })) continue;
-    const int failures = failures_of(place, scan.result.centres_mm[detection]);
-    if (failures == 0) return Pick{i, false, left};
+    const Failure* failure = failure_of(place, scan.result.centres_mm[detection]);
+    if (failure == nullptr) return Pick{i, false, false, left};
     // What was doubtful before it failed is no better the second time.
-    const int picks_max = scan.result.choice.reachable[i].covered_mm > 0 ? 1 : kPicksMax;
-    if (fresh && failures < picks_max && !again) again = Pick{i, true, left};
+    const vision::Reachable& reachable = scan.result.choice.reachable[i];
+    if (!fresh || again || failure->picks >= (reachable.covered_mm > 0 ? 1 : kPicksMax)) continue;
+    const bool other = reachable.other && vision::is_same_way(reachable.T_supply_grasp, failure->T_supply_grasp);
+    again = Pick{i, true, other, left};
   }
   return again;
 }
 
 void PickMemory::answered(const Place& place, const Pick& pick, std::uint16_t pick_id, const config::Picks& options) {
   Scan& scan = scans_.at(place.supply_id);
-  const std::size_t detection = scan.result.choice.reachable[pick.reachable].detection;
-  scan.picked.push_back(detection);
-  open_ =
-      Open{pick_id, place,
-           Failure{scan.result.centres_mm[detection], kSameShare * scan.result.part_width_mm, 1, options.failed_scans}};
+  const vision::Reachable& reachable = scan.result.choice.reachable[pick.reachable];
+  scan.picked.push_back(reachable.detection);
+  open_ = Open{pick_id, place,
+               Failure{scan.result.centres_mm[reachable.detection],
+                       pick.other ? reachable.other->T_supply_grasp : reachable.T_supply_grasp,
+                       kSameShare * scan.result.part_width_mm, 1, options.failed_scans}};
 }
 
 void PickMemory::on_report(std::uint16_t pick_id, bool done, const config::Picks& options) {
@@ -88,6 +92,7 @@ void PickMemory::on_report(std::uint16_t pick_id, bool done, const config::Picks
   ++same->picks;
   same->scans_left = options.failed_scans;
   same->centre_mm = open.would_be.centre_mm;  // it was pushed, perhaps
+  same->T_supply_grasp = open.would_be.T_supply_grasp;
 }
 
 std::vector<std::string> PickMemory::passed_over(const Place& place) const {
@@ -96,11 +101,11 @@ std::vector<std::string> PickMemory::passed_over(const Place& place) const {
   if (kept == scans_.end() || kept->second.part_id != place.part_id) return lines;
   const DetectResult& result = kept->second.result;
   for (const auto& reachable : result.choice.reachable) {
-    const int failures = failures_of(place, result.centres_mm[reachable.detection]);
-    if (failures == 0) continue;
+    const Failure* failure = failure_of(place, result.centres_mm[reachable.detection]);
+    if (failure == nullptr) continue;
     char text[120];
-    std::snprintf(text, sizeof text, "object %zu is passed over: %d pick%s of it failed", reachable.detection, failures,
-                  failures == 1 ? "" : "s");
+    std::snprintf(text, sizeof text, "object %zu is passed over: %d pick%s of it failed", reachable.detection,
+                  failure->picks, failure->picks == 1 ? "" : "s");
     lines.emplace_back(text);
   }
   return lines;

@@ -30,6 +30,7 @@ class PickMemory {
   struct Pick {
     std::size_t reachable = 0;  ///< Index in the choice of the supply's scan.
     bool again = false;         ///< A pick of this object has failed before.
+    bool other = false;         ///< The way that failed would be the same: by the reachable's other one.
     std::size_t left = 0;       ///< Detections beside it that were not picked yet.
   };
   /// The next pick of the kept scan, if there is one: an object that stands apart (margin_mm) from all that were picked
@@ -59,7 +60,8 @@ class PickMemory {
   };
   struct Failure {
     Eigen::Vector3d centre_mm;  ///< Of the object, supply frame.
-    double radius_mm = 0;       ///< An object whose centre is nearer is this one.
+    Transform<frame::Supply, frame::Tcp> T_supply_grasp;
+    double radius_mm = 0;  ///< An object whose centre is nearer is this one.
     int picks = 1;
     int scans_left = 0;
   };
@@ -68,7 +70,8 @@ class PickMemory {
     Place place;
     Failure would_be;
   };
-  int failures_of(const Place& place, const Eigen::Vector3d& centre_mm) const;
+  /// Of this object, the one with most picks; none: nullptr.
+  const Failure* failure_of(const Place& place, const Eigen::Vector3d& centre_mm) const;
 
   std::map<std::uint16_t, Scan> scans_;  ///< By supply.
   std::map<Place, std::vector<Failure>> failures_;

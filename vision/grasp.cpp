@@ -25,6 +25,9 @@ constexpr std::array kRoom{4.0, 2.0, 1.0};
 constexpr double kClearanceNoises = 0.3;
 /// Free grasps of one detection that are looked at for more room.
 constexpr int kFreeMax = 12;
+/// Grasps elsewhere on the object that are looked at for one that is free as well.
+constexpr int kOthersMax = 24;
+constexpr double kSameWayMm = 10, kSameWayRad = 10 * kDegree;
 /// Tilts that differ by less than one over this are equal.
 constexpr double kTiltSteps = 1e5;
 
@@ -62,6 +65,10 @@ struct Candidate {
   Eigen::Isometry3d T_supply_tcp;
   double tilt_rad = 0;
 };
+
+Eigen::Isometry3d approach_of(const Candidate& candidate, const std::vector<Grasp>& grasps) {
+  return candidate.T_supply_tcp * Eigen::Translation3d(0, 0, -grasps[candidate.grasp].approach_mm);
+}
 
 RejectedGrasp beyond_limits(const Candidate& candidate, const Grasp& grasp, const SupplyBox& supply,
                             const ReachLimits& limits) {
@@ -251,6 +258,11 @@ double within(double limit, const Eigen::Matrix3d& covariance) {
 }
 }  // namespace
 
+bool is_same_way(const Transform<frame::Supply, frame::Tcp>& a, const Transform<frame::Supply, frame::Tcp>& b) {
+  return (a.iso.translation() - b.iso.translation()).norm() < kSameWayMm &&
+         a.iso.linear().col(2).dot(b.iso.linear().col(2)) > std::cos(kSameWayRad);
+}
+
 double probability_of_holding(const Detection& detection, const Symmetry& symmetry) {
   Eigen::Matrix3d turn = detection.covariance.bottomRightCorner<3, 3>();
   if (symmetry.kind == Symmetry::Kind::Revolution || symmetry.kind == Symmetry::Kind::RevolutionFlip) {
@@ -316,12 +328,19 @@ GraspChoice choose_grasps(const DetectionReport& report, const Symmetry& symmetr
         }
       ++free;
       if (!best || clearance_mm > best->clearance_mm)
-        best = Reachable{d,
-                         candidate.grasp,
-                         {candidate.T_supply_tcp},
-                         {candidate.T_supply_tcp * Eigen::Translation3d(0, 0, -grasps[candidate.grasp].approach_mm)},
-                         clearance_mm};
+        best = Reachable{d, candidate.grasp, {candidate.T_supply_tcp}, {approach_of(candidate, grasps)}, clearance_mm};
       if (!checks || checks->is_roomy(clearance_mm)) break;
+    }
+    if (best) {
+      int looked = 0;
+      for (const Candidate& candidate : candidates) {
+        if (is_same_way({candidate.T_supply_tcp}, best->T_supply_grasp)) continue;
+        if (++looked > kOthersMax) break;
+        double clearance_mm = 0;
+        if (checks && checks->check(candidate, clearance_mm).why != Obstacle::None) continue;
+        best->other = Reachable::Other{candidate.grasp, {candidate.T_supply_tcp}, {approach_of(candidate, grasps)}};
+        break;
+      }
     }
     if (best && checks) {
       best->covered_mm = checks->covered_mm();

@@ -33,6 +33,9 @@ double probability_of_holding(const Detection& detection, const Symmetry& symmet
 std::vector<Eigen::Isometry3d> poses_of(const Grasp& grasp, const Transform<frame::Supply, frame::Object>& object,
                                         const Symmetry& symmetry);
 
+/// Whether both take an object at the same place (10 mm) and come the same way (10 degrees), however the jaws stand.
+bool is_same_way(const Transform<frame::Supply, frame::Tcp>& a, const Transform<frame::Supply, frame::Tcp>& b);
+
 struct Reachable {
   std::size_t detection = 0;  ///< Index in the report.
   std::size_t grasp = 0;
@@ -41,6 +44,13 @@ struct Reachable {
   double clearance_mm = 0;  ///< So much room is all around; 0: nobody asked, or only where holes are free.
   double covered_mm = 0;    ///< So far another one may reach over it: it would be lifted with it.
   bool is_tight = false;    ///< Hardly more room than the clearance.
+  /// For a second try: free too, and somewhere else on the object or from elsewhere.
+  struct Other {
+    std::size_t grasp = 0;
+    Transform<frame::Supply, frame::Tcp> T_supply_grasp;
+    Transform<frame::Supply, frame::Tcp> T_supply_approach;
+  };
+  std::optional<Other> other = std::nullopt;
 };
 /// A grasp in one of the poses that the symmetry allows, and why it is not offered.
 struct RejectedGrasp {

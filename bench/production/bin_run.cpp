@@ -199,9 +199,11 @@ class BinRun {
     if (!cell_.results().empty()) {
       const auto& seen = cell_.results().back();
       const Eigen::Isometry3d T_stands_found = T_said_stands_.iso.inverse() * seen.place.T_said_found;
+      const auto is_sent = [&](const TcpPose& T_found_grasp) {
+        return (T_stands_found.matrix() * T_found_grasp.iso.matrix() - T_supply_grasp.iso.matrix()).norm() < 0.1;
+      };
       for (const auto& reachable : seen.choice.reachable)
-        if ((T_stands_found.matrix() * reachable.T_supply_grasp.iso.matrix() - T_supply_grasp.iso.matrix()).norm() <
-            0.1)
+        if (is_sent(reachable.T_supply_grasp) || (reachable.other && is_sent(reachable.other->T_supply_grasp)))
           poses.push_back({T_stands_found * seen.report.detections[reachable.detection].T_supply_object.iso});
     }
     if (poses.empty())

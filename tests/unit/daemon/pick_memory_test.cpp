@@ -134,6 +134,29 @@ TEST_F(PickMemoryTest, WhatAnotherOneMayLieOnIsTriedOnce) {
   EXPECT_EQ(pick(), 0) << "nothing may lie on it any more";
 }
 
+TEST_F(PickMemoryTest, ASecondTryGoesAnotherWay) {
+  DetectResult result = scan_of({0});
+  vision::Reachable& only = result.choice.reachable[0];
+  only.other = vision::Reachable::Other{1, {}, {}};
+  only.other->T_supply_grasp.iso.translation().x() = 30;
+  memory.keep(kPlace, result, kScanned);
+  EXPECT_FALSE(memory.next(kPlace, options, kScanned)->other);
+  pick();
+  fail();
+  memory.keep(kPlace, result, kScanned);
+  EXPECT_TRUE(memory.next(kPlace, options, kScanned)->other);
+  // The best one is another one this time.
+  only.T_supply_grasp.iso.translation().y() = 12;
+  memory.keep(kPlace, result, kScanned);
+  EXPECT_FALSE(memory.next(kPlace, options, kScanned)->other);
+  // There is no other one.
+  only.T_supply_grasp = {};
+  only.other.reset();
+  memory.keep(kPlace, result, kScanned);
+  EXPECT_FALSE(memory.next(kPlace, options, kScanned)->other);
+  EXPECT_TRUE(memory.next(kPlace, options, kScanned)->again);
+}
+
 TEST_F(PickMemoryTest, WithoutMemoryTheSameOneIsTriedAgainAndAgain) {
   options.failed_scans = 0;
   for (int round = 0; round < 5; ++round) {

@@ -325,6 +325,24 @@ TEST(Clearance, WhatMayLieUnderAnotherOneGoesLast) {
   EXPECT_NE(choice.unreachable[0].reason.find("mm wide"), std::string::npos) << choice.unreachable[0].reason;
 }
 
+TEST(Clearance, AnotherGraspStandsByForASecondTry) {
+  Table table{bar()};
+  table.lay({0, 0, 10});
+  Grasp at_end = across_bar(), near = across_bar();
+  at_end.T_object_tcp.iso.translation().x() = 20;
+  near.T_object_tcp.iso.translation().x() = 5;
+  EXPECT_FALSE(table.choose({across_bar(), near}).reachable[0].other) << "nearly the same";
+  const auto found = table.choose({across_bar(), near, at_end}).reachable[0];
+  ASSERT_TRUE(found.other);
+  EXPECT_EQ(found.other->grasp, 2U);
+  EXPECT_NEAR(found.other->T_supply_grasp.iso.translation().x(), 20, 1e-6);
+  EXPECT_NEAR(found.other->T_supply_approach.iso.translation().z() - found.other->T_supply_grasp.iso.translation().z(),
+              60, 1e-6);
+  // It has to be free as well.
+  table.lay_block(14, 30, 14, 30, 40);
+  EXPECT_FALSE(table.choose({across_bar(), near, at_end}).reachable[0].other);
+}
+
 TEST(Clearance, AGripFromWithinABore) {
   Gripper gripper = two_jaws();
   gripper.jaws->size_mm = {6, 10, 40};
