@@ -350,7 +350,7 @@ const std::vector<Section<Config>>& cell_sections() {
             [](C& c) -> Slot { return &c.picks.margin_mm; }},
            {{.name = "failed_scans", .type = Integer, .min = 0, .max = 1000, .default_value = "10",
              .help = "For so many scans a failed pick is remembered: its object comes after all others, and is left alone "
-                     "when a second one has failed. 0: not at all."},
+                     "when a second one has failed, or the first where another object may lie on it. 0: not at all."},
             [](C& c) -> Slot { return &c.picks.failed_scans; }},
        }},
   };

@@ -113,6 +113,21 @@ void check_carried(const Config& c, const CellPlaces& at, Findings& findings) {
   }
 }
 
+/// Parts are lifted along the base's z; where that does not lead out of the supply every program would hit something.
+void check_up(const Config& c, const CellPlaces& at, Findings& findings) {
+  constexpr double kSlantMax = std::numbers::pi / 3;
+  for (std::size_t i = 0; i < c.supplies.size(); ++i) {
+    if (!at.supplies[i].given("T_base_supply")) continue;
+    const double slant_rad = std::acos(std::clamp(c.supplies[i].T_base_supply.iso.linear()(2, 2), -1.0, 1.0));
+    if (slant_rad > kSlantMax)
+      findings.add(at.supplies[i].of("T_base_supply"),
+                   "the supply's z axis, out of it, and the base's, along which parts are lifted, are " +
+                       whole(slant_rad * 180 / std::numbers::pi) +
+                       " deg apart, 60 are allowed; correct rpy_deg, or give the arm on a ceiling or wall a user frame "
+                       "whose z points up");
+  }
+}
+
 /// A supply of which nothing is within reach.
 void check_supplies_reach(const Config& c, const CellPlaces& at, Findings& findings) {
   if (!at.given("reach", "radius_max_mm") || c.reach.radius_max_mm <= c.reach.axis_min_mm) return;
@@ -146,6 +161,7 @@ void check_sizes(const Config& c, const CellPlaces& at, Findings& findings) {
 }  // namespace
 
 void check_geometry(const Config& config, const CellPlaces& places, Findings& findings) {
+  check_up(config, places, findings);
   check_views(config, places, findings);
   check_carried(config, places, findings);
   check_reach(config, places, findings);

@@ -100,7 +100,7 @@ inline constexpr std::array kRegisters{
     Register{"approach_a", 56, Type::F32, Direction::CellToPlc, "rad or deg", "First angle: rx, W or O."},
     Register{"approach_b", 58, Type::F32, Direction::CellToPlc, "rad or deg", "Second angle: ry, P or A."},
     Register{"approach_c", 60, Type::F32, Direction::CellToPlc, "rad or deg", "Third angle: rz, R or T."},
-    Register{"grasp_x", 62, Type::F32, Direction::CellToPlc, "m or mm", "Grasp pose, likewise. Go from approach to grasp in a straight line."},
+    Register{"grasp_x", 62, Type::F32, Direction::CellToPlc, "m or mm", "Grasp pose, likewise. Come straight down to the approach pose, go to the grasp in a straight line, lift straight up (docs/picking.md)."},
     Register{"grasp_y", 64, Type::F32, Direction::CellToPlc, "m or mm", ""},
     Register{"grasp_z", 66, Type::F32, Direction::CellToPlc, "m or mm", ""},
     Register{"grasp_a", 68, Type::F32, Direction::CellToPlc, "rad or deg", ""},

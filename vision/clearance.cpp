@@ -157,7 +157,7 @@ Contact contact_of_part(const Template& lower_side, const Eigen::Vector2d& origi
                         double way_mm, double slack_mm, const Heights& heights, const SupplyBox& supply) {
   Contact deepest;
   const double aside_mm = way_mm * up.head<2>().norm();
-  const auto steps = static_cast<int>(std::floor(aside_mm / heights.pixel_mm));
+  const auto steps = static_cast<int>(std::ceil(std::min(1e5, aside_mm / heights.pixel_mm)));
   if (steps == 0 || lower_side.rows == 0) return deepest;
   const bool walled = supply.size_mm.x() > 0 && supply.size_mm.y() > 0;
   const float highest = heights.block_mm.size() > 0 ? heights.block_mm.maxCoeff() : 0.0F;

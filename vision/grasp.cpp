@@ -100,6 +100,14 @@ RejectedGrasp beyond_limits(const Candidate& candidate, const Grasp& grasp, cons
   return found;
 }
 
+/// Fine enough to tell how wide one object covers another, and no more than some hundred pixels across.
+double fine_pixel_mm(const GripperScene& scene) {
+  constexpr double kAcrossMax = 360;
+  Eigen::AlignedBox3f extents;
+  for (const auto& vertex : scene.part.vertices_mm) extents.extend(vertex);
+  return std::max(scene.image.pixel_mm / 3, static_cast<double>(extents.sizes().norm()) / kAcrossMax);
+}
+
 /// Of two rejected ones, that which got farther in the tests. Of those that leave the limits the one that does so
 /// least; the others come in the order of their rank.
 bool got_farther(const RejectedGrasp& a, const RejectedGrasp& b) {
@@ -125,7 +133,7 @@ class Checks {
         around_{scene.image, supply, part_, report.detections, scene.noise_mm},
         holes_{limits.unmeasured == Unmeasured::Blocked},
         highest_mm_{static_cast<double>(around_.highest_mm())},
-        overlaps_mm_{vision::overlaps_mm(part_, report.detections, scene.image.pixel_mm / 3)},
+        overlaps_mm_{vision::overlaps_mm(part_, report.detections, fine_pixel_mm(scene))},
         up_{limits.T_base_supply.iso.linear().transpose() * Eigen::Vector3d::UnitZ()},
         hits_part_(grasps.size()) {
     for (const Grasp& grasp : grasps) sweepers_.push_back(sweepers_of(scene.gripper, grasp));
@@ -144,6 +152,17 @@ class Checks {
           window.extend(Eigen::Vector2d{box.max().head<2>()});
         }
       }
+    if (slants_) {
+      // And as the part on its way out.
+      Eigen::AlignedBox3d part;
+      const Eigen::Isometry3d& T = report_.detections[detection].T_supply_object.iso;
+      for (const auto& vertex : scene_.part.vertices_mm) part.extend(T * vertex.cast<double>());
+      for (const Candidate& candidate : candidates) {
+        const Eigen::AlignedBox3d out = part.merged(part.translated(lift_mm(grasps_[candidate.grasp]) * up_));
+        window.extend(Eigen::Vector2d{out.min().head<2>()});
+        window.extend(Eigen::Vector2d{out.max().head<2>()});
+      }
+    }
     if (window.isEmpty()) window.extend(Eigen::Vector2d{candidates.front().T_supply_tcp.translation().head<2>()});
     // What stands beside it may hide something within.
     const Eigen::Vector2d margin = Eigen::Vector2d::Constant(0.4 * std::min(highest_mm_, kHiddenMm));
@@ -205,15 +224,18 @@ class Checks {
     return -grasps_[candidate.grasp].approach_mm * candidate.T_supply_tcp.linear().col(2);
   }
   double lift_mm(const Grasp& grasp) const {
-    return grasp.retreat_mm > 0 ? grasp.retreat_mm : std::max(highest_mm_, supply_.size_mm.z()) / up_.z();
+    constexpr double kSteepest = 0.1;
+    const double out_mm = std::max(highest_mm_, supply_.size_mm.z()) / std::max(up_.z(), kSteepest);
+    return grasp.retreat_mm > 0 ? grasp.retreat_mm : out_mm;
   }
   Eigen::AlignedBox3d box_of(const Gripper::Solid& solid, const Candidate& candidate, double times) const {
     const Eigen::Isometry3d T = candidate.T_supply_tcp * solid.T_tcp_solid;
     const Eigen::Vector3d half = T.linear().cwiseAbs() * (0.5 * solid.size_mm.array() + times * clearance_mm_).matrix();
     const Eigen::AlignedBox3d end{T.translation() - half, T.translation() + half};
     Eigen::AlignedBox3d box = end.merged(end.translated(way_in(candidate)));
-    if (slants_) box.extend(end.translated(lift_mm(grasps_[candidate.grasp]) * up_));
-    return box;
+    if (!slants_) return box;
+    const Eigen::AlignedBox3d above = box.translated(lift_mm(grasps_[candidate.grasp]) * up_);
+    return box.merged(above);
   }
   /// The first that is found: jaws are asked before the body.
   Contact contact_of_gripper(const Candidate& candidate, double times, bool holes) const {
@@ -222,8 +244,13 @@ class Checks {
       const Swept in{solid, candidate.T_supply_tcp, way_in(candidate), times * clearance_mm_};
       if (const Contact found = contact(in, heights_, supply_, holes); found.with != Obstacle::None) return found;
       if (!slants_) continue;
-      const Swept out{solid, candidate.T_supply_tcp, lift_mm(grasps_[candidate.grasp]) * up_, times * clearance_mm_};
-      if (const Contact found = contact(out, heights_, supply_, holes); found.with != Obstacle::None) return found;
+      // Down to the approach pose, and up from the grasp.
+      const Eigen::Vector3d lift_mm_up = lift_mm(grasps_[candidate.grasp]) * up_;
+      for (const Eigen::Isometry3d& T : {approach_of(candidate, grasps_), candidate.T_supply_tcp}) {
+        const Swept upright{solid, T, lift_mm_up, times * clearance_mm_};
+        if (const Contact found = contact(upright, heights_, supply_, holes); found.with != Obstacle::None)
+          return found;
+      }
     }
     return {};
   }
@@ -240,7 +267,7 @@ class Checks {
   std::vector<double> overlaps_mm_;  ///< Of each detection: how far others reach over it.
   Eigen::Vector3d up_;               ///< The arm's way out.
   /// Where the supply stands level, a way straight up is as free as its beginning: all is solid from its surface down.
-  bool slants_ = up_.head<2>().norm() > 1e-3;
+  bool slants_ = up_.head<2>().norm() > 1e-3 || up_.z() < 0;
   std::vector<std::vector<Gripper::Solid>> sweepers_;  ///< Of each grasp.
   std::vector<std::optional<bool>> hits_part_;
   std::size_t detection_ = 0;

@@ -174,7 +174,7 @@ Arguments parse(CLI::App& app, int argc, char** argv) {
       ->excludes(faults)
       ->excludes(displaced);
   displaced->excludes(faults);
-  app.add_flag("--talks", arguments.talks, "tells of each pick that failed");
+  app.add_flag("--talks", arguments.talks, "tells of each pick that failed, each fault, and why nothing was reachable");
   app.parse(argc, argv);
   if (is_displaced) arguments.displaced = kDisplaced_mm;
   if (is_centred) arguments.displaced = 0;

@@ -346,6 +346,23 @@ TEST(Load, WhereTheRobotCarriesTheScannerMetresAreAMistakeToo) {
       std::string::npos);
 }
 
+TEST(Load, ABaseThatDoesNotPointUpIsAMistake) {
+  const auto said = [](const std::string& rpy_deg) {
+    CellFolder folder;
+    put_on_robot(folder, "ur");
+    folder.edit("T_base_supply = { xyz_mm = [1200, 0, 0], rpy_deg = [0, 0, 0]",
+                "T_base_supply = { xyz_mm = [1200, 0, 0], rpy_deg = " + rpy_deg);
+    return folder.findings();
+  };
+  EXPECT_EQ(said("[20, 0, 90]"), "") << "a supply that stands slanted";
+  EXPECT_NE(said("[180, 0, 0]")
+                .find("are lifted, are 180 deg apart, 60 are allowed; correct rpy_deg, or give the arm "
+                      "on a ceiling or wall a user frame whose z points up\n"),
+            std::string::npos)
+      << said("[180, 0, 0]");
+  EXPECT_NE(said("[0, 90, 0]").find("90 deg apart"), std::string::npos) << said("[0, 90, 0]");
+}
+
 TEST(Load, ASupplyThatNobodyReachesIsAMistake) {
   CellFolder folder;
   folder.edit("radius_max_mm = 0", "radius_max_mm = 690");

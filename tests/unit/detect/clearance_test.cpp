@@ -306,6 +306,32 @@ TEST(Clearance, InASlantedSupplyTheGripperMustPassOnTheWayOut) {
   EXPECT_EQ(table.why_not(across_bar()), Obstacle::None);
 }
 
+TEST(Clearance, InASlantedSupplyTheWayDownMustBeFree) {
+  // The tool stands as the supply does; it comes down to the approach pose along the base's z, where a post stands.
+  Table table{bar()};
+  table.lay({0, 0, 10});
+  ReachLimits slanted = usual();
+  slanted.T_base_supply.iso.linear() = Eigen::AngleAxisd(-kPi / 6, Vector3d::UnitY()).toRotationMatrix();
+  Gripper slim = two_jaws();
+  slim.body.clear();
+  Grasp low = across_bar();
+  low.approach_mm = 15;
+  low.retreat_mm = 12;
+  EXPECT_EQ(table.why_not(low, slanted, slim), Obstacle::None);
+  table.lay_block(8, 12, -26, -14, 34);  // over the lift's 12 mm, in the way of the descent
+  EXPECT_EQ(table.why_not(low, slanted, slim), Obstacle::Neighbour);
+}
+
+TEST(Clearance, ABaseThatDoesNotPointUpIsNoEnd) {
+  Table table{bar()};
+  table.lay({0, 0, 10});
+  for (const double angle : {kPi / 2, 2 * kPi / 3, kPi}) {
+    ReachLimits turned = usual();
+    turned.T_base_supply.iso.linear() = Eigen::AngleAxisd(angle, Vector3d::UnitY()).toRotationMatrix();
+    EXPECT_NE(table.why_not(across_bar(), turned), Obstacle::None) << "through the floor or the wall";
+  }
+}
+
 TEST(Clearance, WhatMayLieUnderAnotherOneGoesLast) {
   // The second bar lies across the first one's end and reaches over it by a hair; the third lies alone, lower.
   Table table{bar()};
