@@ -219,10 +219,11 @@ class Checks {
   /// What reaches farther over an object lies on it, and would be lifted with it; from the lesser width on it may.
   static constexpr double kCoveredMaxNoises = 2, kCoveredNoises = 0.3;
 
-  /// From the approach pose, seen from the grasp, and what the arm lifts.
+  /// To the approach pose, from the grasp.
   Eigen::Vector3d way_in(const Candidate& candidate) const {
     return -grasps_[candidate.grasp].approach_mm * candidate.T_supply_tcp.linear().col(2);
   }
+  /// As far along up_ as the part has to pass.
   double lift_mm(const Grasp& grasp) const {
     constexpr double kSteepest = 0.1;
     const double out_mm = std::max(highest_mm_, supply_.size_mm.z()) / std::max(up_.z(), kSteepest);
@@ -245,9 +246,9 @@ class Checks {
       if (const Contact found = contact(in, heights_, supply_, holes); found.with != Obstacle::None) return found;
       if (!slants_) continue;
       // Down to the approach pose, and up from the grasp.
-      const Eigen::Vector3d lift_mm_up = lift_mm(grasps_[candidate.grasp]) * up_;
+      const Eigen::Vector3d lift = lift_mm(grasps_[candidate.grasp]) * up_;
       for (const Eigen::Isometry3d& T : {approach_of(candidate, grasps_), candidate.T_supply_tcp}) {
-        const Swept upright{solid, T, lift_mm_up, times * clearance_mm_};
+        const Swept upright{solid, T, lift, times * clearance_mm_};
         if (const Contact found = contact(upright, heights_, supply_, holes); found.with != Obstacle::None)
           return found;
       }

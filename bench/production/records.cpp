@@ -56,12 +56,12 @@ RequestRecord to_request(const Json& json) {
   r.cause = json.value("cause", "");
   r.place_mm = json.value("place_mm", 0.0);
   r.place_deg = json.value("place_deg", 0.0);
+  r.why = json.value("why", "");
   if (r.answer != "pick") return r;
   json.at("error_mm").get_to(r.error_mm);
   json.at("error_deg").get_to(r.error_deg);
   json.at("wrong").get_to(r.wrong);
   json.at("grip").get_to(r.grip);
-  json.at("why").get_to(r.why);
   json.at("grasp").get_to(r.grasp);
   json.at("retry").get_to(r.retry);
   json.at("score").get_to(r.score);
@@ -98,13 +98,13 @@ std::string to_json(const RequestRecord& r) {
   if (r.fault) json["fault"] = to_json(*r.fault);
   if (r.closed_wrong) json["closed_wrong"] = true;
   if (!r.cause.empty()) json["cause"] = r.cause;
+  if (!r.why.empty()) json["why"] = r.why;
   if (r.place_mm > 0) json.update({{"place_mm", rounded(r.place_mm, 1e-3)}, {"place_deg", rounded(r.place_deg, 1e-3)}});
   if (r.answer == "pick")
     json.update({{"error_mm", rounded(r.error_mm, 1e-3)},
                  {"error_deg", rounded(r.error_deg, 1e-3)},
                  {"wrong", r.wrong},
                  {"grip", r.grip},
-                 {"why", r.why},
                  {"grasp", r.grasp},
                  {"retry", r.retry},
                  {"score", rounded(r.score, 1e-4)},

@@ -52,9 +52,12 @@ TEST_F(Records, AreReadAsTheyWereWritten) {
   failed.why = "the jaw reaches 2.0 mm into \"object\" 3";
   failed.retry = true;
   append_bin(path_, {pick(1, 0, "taken"), failed, answer(1, 2, "empty", 0)}, bin(1, 0, 0, "empty"));
-  append_bin(path_, {pick(2, 0, "taken")}, bin(2, 3, 1, "not_reachable"));
+  RequestRecord left = answer(2, 1, "not_reachable", 3);
+  left.why = "something lies on it, 7.8 mm wide";
+  append_bin(path_, {pick(2, 0, "taken"), left}, bin(2, 3, 1, "not_reachable"));
   const PartRun run = read_part_run(path_, "{\"seed\":1}");
-  ASSERT_EQ(run.requests.size(), 4U);
+  ASSERT_EQ(run.requests.size(), 5U);
+  EXPECT_EQ(run.requests[4].why, left.why);
   ASSERT_EQ(run.bins.size(), 2U);
   EXPECT_EQ(run.picks(), 3);
   EXPECT_EQ(to_json(run.requests[1]), to_json(failed));
