@@ -70,6 +70,12 @@ Eigen::Isometry3d approach_of(const Candidate& candidate, const std::vector<Gras
   return candidate.T_supply_tcp * Eigen::Translation3d(0, 0, -grasps[candidate.grasp].approach_mm);
 }
 
+/// As far up as the approach pose stands off.
+Transform<frame::Supply, frame::Tcp> lifted(const Candidate& candidate, const std::vector<Grasp>& grasps,
+                                            const Eigen::Vector3d& up) {
+  return {Eigen::Translation3d{grasps[candidate.grasp].approach_mm * up} * candidate.T_supply_tcp};
+}
+
 RejectedGrasp beyond_limits(const Candidate& candidate, const Grasp& grasp, const SupplyBox& supply,
                             const ReachLimits& limits) {
   RejectedGrasp found;
@@ -312,6 +318,7 @@ std::vector<Eigen::Isometry3d> poses_of(const Grasp& grasp, const Transform<fram
 
 GraspChoice choose_grasps(const DetectionReport& report, const Symmetry& symmetry, const std::vector<Grasp>& grasps,
                           const SupplyBox& supply, const ReachLimits& limits, const GripperScene* scene) {
+  const Eigen::Vector3d up = limits.T_base_supply.iso.linear().transpose() * Eigen::Vector3d::UnitZ();
   std::optional<Checks> checks;
   if (scene != nullptr && !report.detections.empty()) checks.emplace(report, grasps, supply, limits, *scene);
   GraspChoice choice;
@@ -356,7 +363,12 @@ GraspChoice choose_grasps(const DetectionReport& report, const Symmetry& symmetr
         }
       ++free;
       if (!best || clearance_mm > best->clearance_mm)
-        best = Reachable{d, candidate.grasp, {candidate.T_supply_tcp}, {approach_of(candidate, grasps)}, clearance_mm};
+        best = Reachable{d,
+                         candidate.grasp,
+                         {candidate.T_supply_tcp},
+                         {approach_of(candidate, grasps)},
+                         lifted(candidate, grasps, up),
+                         clearance_mm};
       if (!checks || checks->is_roomy(clearance_mm)) break;
     }
     if (best) {
@@ -366,7 +378,8 @@ GraspChoice choose_grasps(const DetectionReport& report, const Symmetry& symmetr
         if (++looked > kOthersMax) break;
         double clearance_mm = 0;
         if (checks && checks->check(candidate, clearance_mm).why != Obstacle::None) continue;
-        best->other = Reachable::Other{candidate.grasp, {candidate.T_supply_tcp}, {approach_of(candidate, grasps)}};
+        best->other = Reachable::Other{
+            candidate.grasp, {candidate.T_supply_tcp}, {approach_of(candidate, grasps)}, lifted(candidate, grasps, up)};
         break;
       }
     }

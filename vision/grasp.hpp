@@ -41,6 +41,8 @@ struct Reachable {
   std::size_t grasp = 0;
   Transform<frame::Supply, frame::Tcp> T_supply_grasp;
   Transform<frame::Supply, frame::Tcp> T_supply_approach;
+  /// Turned as at the grasp. The part goes there in a straight line, and from there straight up (z of the base).
+  Transform<frame::Supply, frame::Tcp> T_supply_retreat;
   double clearance_mm = 0;  ///< So much room is all around; 0: nobody asked, or only where holes are free.
   double covered_mm = 0;    ///< So far another one may reach over it: it would be lifted with it.
   bool is_tight = false;    ///< Hardly more room than the clearance.
@@ -49,6 +51,7 @@ struct Reachable {
     std::size_t grasp = 0;
     Transform<frame::Supply, frame::Tcp> T_supply_grasp;
     Transform<frame::Supply, frame::Tcp> T_supply_approach;
+    Transform<frame::Supply, frame::Tcp> T_supply_retreat;
   };
   std::optional<Other> other = std::nullopt;
 };

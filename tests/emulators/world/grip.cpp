@@ -324,10 +324,17 @@ GripResult grip(const LivingPile& pile, const Gripper& gripper, const std::vecto
 
   // 3. Out.
   const std::vector<Gripper::Solid> holding = vision::solids_of(gripper, closed.jaws_mm);
-  TcpPose out = motion.T_supply_grasp;
-  const double gripper_above = above.iso.translation().z() - out.iso.translation().z();
-  out.iso.translation().z() += std::max(gripper_above, top_of(world) - double{target.box.min().z()});
-  const auto up = line(motion.T_supply_grasp, out, rules.step_mm);
+  const TcpPose aside = motion.T_supply_retreat.value_or(motion.T_supply_grasp);
+  TcpPose out = aside;
+  const double gripper_above = above.iso.translation().z() - motion.T_supply_grasp.iso.translation().z();
+  const double raised = aside.iso.translation().z() - motion.T_supply_grasp.iso.translation().z();
+  out.iso.translation().z() +=
+      std::max(0.0, std::max(gripper_above, top_of(world) - double{target.box.min().z()}) - raised);
+  std::vector<TcpPose> up = line(aside, out, rules.step_mm);
+  if (motion.T_supply_retreat) {
+    const auto first = line(motion.T_supply_grasp, aside, rules.step_mm);
+    up.insert(up.begin(), first.begin(), first.end());
+  }
   if (const auto hit = first_hit(world, holding, gripper.body.size(), up, result.object, rules.hit_mm))
     return collided(result, Phase::Up, *hit, up, motion.T_supply_grasp);
 
