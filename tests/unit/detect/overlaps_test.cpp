@@ -1,6 +1,10 @@
 #include "vision/overlaps.hpp"
 
+#include <cmath>
 #include <gtest/gtest.h>
+#include <map>
+#include <random>
+#include <utility>
 
 #include "tests/unit/detect/shapes.hpp"
 
@@ -16,7 +20,71 @@ std::vector<double> overlaps_of(const std::vector<Eigen::Vector3d>& at) {
   for (const Eigen::Vector3d& t : at) detections.emplace_back().T_supply_object.iso.translation() = t;
   return overlaps_mm(Rasteriser{bar}, detections, kPixelMm);
 }
+
+using Middles = std::map<std::pair<int, int>, float>;
+
+/// Twice the middle of the height, by row and column: drawn from above and, turned over, from below.
+Middles middles_of(const Rasteriser& part, const Eigen::Isometry3d& T) {
+  const Eigen::Vector3f over{1, -1, -1};
+  const Eigen::Matrix3f R = T.linear().cast<float>();
+  const Eigen::Vector3f t = T.translation().cast<float>();
+  Template upper, lower;
+  part.draw(R, t, kPixelMm, Eigen::Vector2d::Zero(), upper);
+  part.draw(over.asDiagonal() * R, over.asDiagonal() * t, kPixelMm, Eigen::Vector2d::Zero(), lower);
+  Middles middles;
+  for (int r = 0; r < upper.rows; ++r)
+    for (int c = 0; c < upper.cols; ++c) {
+      const int row = upper.row0 + r, col = upper.col0 + c, below = -row - lower.row0, beside = col - lower.col0;
+      if (below < 0 || beside < 0 || below >= lower.rows || beside >= lower.cols) continue;
+      const float middle = upper.top_mm[upper.at(r, c)] - lower.top_mm[lower.at(below, beside)];
+      if (!std::isnan(middle)) middles[{row, col}] = middle;
+    }
+  return middles;
+}
+
+/// The side of the largest square, each one tried.
+double square_mm(const Middles& object, const Middles& other) {
+  const auto stands_over = [&](int row, int col) {
+    const auto own = object.find({row, col}), its = other.find({row, col});
+    return own != object.end() && its != other.end() && its->second > own->second;
+  };
+  int largest = 0;
+  for (const auto& [at, middle] : object)
+    for (bool grows = true; grows;) {
+      for (int k = 0; k <= largest && grows; ++k)
+        for (int l = 0; l <= largest && grows; ++l) grows = stands_over(at.first + k, at.second + l);
+      largest += grows ? 1 : 0;
+    }
+  return kPixelMm * largest;
+}
 }  // namespace
+
+TEST(Overlaps, AreThoseOfEveryPixelOfEveryPair) {
+  Mesh bar;
+  shapes::add_box(bar, {-30, -10, -10}, {30, 10, 10});
+  const Rasteriser part{bar};
+  std::mt19937 random{7};
+  std::uniform_real_distribution<double> place{-40, 40}, unit{-1, 1};
+  std::vector<Detection> detections(8);
+  std::vector<Middles> middles;
+  for (Detection& detection : detections) {
+    auto& T = detection.T_supply_object.iso;
+    T.linear() =
+        Eigen::Quaterniond{unit(random), unit(random), unit(random), unit(random)}.normalized().toRotationMatrix();
+    T.translation() = Eigen::Vector3d{place(random), place(random), 30 + 20 * unit(random)};
+    middles.push_back(middles_of(part, T));
+  }
+  const auto found = overlaps_mm(part, detections, kPixelMm);
+  int covered = 0;
+  for (std::size_t a = 0; a < detections.size(); ++a) {
+    double largest = 0;
+    for (std::size_t b = 0; b < detections.size(); ++b)
+      if (a != b) largest = std::max(largest, square_mm(middles[a], middles[b]));
+    EXPECT_EQ(found[a], largest) << a;
+    covered += largest > 0 ? 1 : 0;
+  }
+  EXPECT_GT(covered, 3);
+}
 
 TEST(Overlaps, AreAsWideAsTheStripThatIsCovered) {
   for (const double over : {0.0, 1.0, 3.0, 8.0}) {
