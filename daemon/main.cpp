@@ -17,6 +17,7 @@
 #include "daemon/progress_watch.hpp"
 #include "daemon/record_writer.hpp"
 #include "daemon/reloader.hpp"
+#include "daemon/spare_memory.hpp"
 #include "daemon/vision_worker.hpp"
 #include "drivers/link/loop.hpp"
 
@@ -58,6 +59,7 @@ class Watchdog {
 };
 
 int run(const std::string& path) {
+  share_one_heap();
   const int signals = open_signals();
   auto loaded = load_cell(path);
   if (!loaded) {

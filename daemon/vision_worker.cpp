@@ -4,12 +4,17 @@
 #include <exception>
 #include <map>
 #include <string>
+#include <utility>
 
 #include "base/log.hpp"
+#include "daemon/spare_memory.hpp"
 #include "vision/draw.hpp"
 
 namespace binpick::daemon {
 namespace {
+/// So long after a scan its answer is with the robot, and the next sweep takes longer than to give memory back.
+constexpr std::chrono::milliseconds kQuiet{500};
+
 /// Pictures are numbered by cycle; a picture that cannot be made never costs a cycle.
 void draw(const DetectRequest& request, const DetectResult& result) noexcept {
   const auto& dir = request.cell->config.picture_dir;
@@ -54,11 +59,15 @@ bool VisionWorker::post(DetectRequest request) { return requests_.try_push(std::
 std::optional<DetectResult> VisionWorker::take_result() { return results_.try_pop(); }
 
 void VisionWorker::work() {
+  bool looked = false;  // since memory was given back
   while (!requests_.closed()) {
-    auto request = requests_.pop_for(std::chrono::milliseconds(500));
+    auto request = requests_.pop_for(kQuiet);
     ++progress_;
-    if (!request) continue;
-    busy_ = true;
+    if (!request) {
+      if (std::exchange(looked, false)) give_back_spare_memory();
+      continue;
+    }
+    busy_ = looked = true;
     DetectResult result = run_detection(*request);
     DetectResult to_draw = result;
     // The loop takes results faster than detections are made; a full box means that nobody listens any more.
