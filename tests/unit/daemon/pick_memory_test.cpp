@@ -15,8 +15,10 @@ DetectResult scan_of(std::initializer_list<double> xs) {
   for (const double x : xs) {
     vision::Detection detection;
     detection.score = 0.9;
-    result.choice.reachable.push_back(
-        {.detection = result.report.detections.size(), .T_supply_grasp = {}, .T_supply_approach = {}});
+    result.choice.reachable.push_back({.detection = result.report.detections.size(),
+                                       .T_supply_grasp = {},
+                                       .T_supply_approach = {},
+                                       .T_supply_retreat = {}});
     result.report.detections.push_back(detection);
     result.centres_mm.emplace_back(x, 0, 10);
     result.footprints.push_back({{{x - 10, -10}, {x + 10, -10}, {x + 10, 10}, {x - 10, 10}}});
@@ -137,7 +139,7 @@ TEST_F(PickMemoryTest, WhatAnotherOneMayLieOnIsTriedOnce) {
 TEST_F(PickMemoryTest, ASecondTryGoesAnotherWay) {
   DetectResult result = scan_of({0});
   vision::Reachable& only = result.choice.reachable[0];
-  only.other = vision::Reachable::Other{1, {}, {}};
+  only.other = vision::Reachable::Other{1, {}, {}, {}};
   only.other->T_supply_grasp.iso.translation().x() = 30;
   memory.keep(kPlace, result, kScanned);
   EXPECT_FALSE(memory.next(kPlace, options, kScanned)->other);
