@@ -298,6 +298,7 @@ void Cell::publish(TimePoint now) {
     const Transform<frame::Base, frame::Supply> T_base_supply{supply.T_base_supply.iso * scan.place.T_said_found};
     answer.T_base_approach = T_base_supply * (pick->other ? grasp.other->T_supply_approach : grasp.T_supply_approach);
     answer.T_base_grasp = T_base_supply * (pick->other ? grasp.other->T_supply_grasp : grasp.T_supply_grasp);
+    answer.T_base_retreat = T_base_supply * (pick->other ? grasp.other->T_supply_retreat : grasp.T_supply_retreat);
     memory_.answered(place(), *pick, pick_id_, data_->config.picks);
     unfetched_since_ = new_scan ? std::optional{last_profile_at_} : std::nullopt;
     if (pick->again)

@@ -34,6 +34,7 @@ struct PickResult {
   double score = 0;                             ///< 0 … 1.
   Transform<frame::Base, frame::Tcp> T_base_approach;
   Transform<frame::Base, frame::Tcp> T_base_grasp;
+  Transform<frame::Base, frame::Tcp> T_base_retreat;  ///< Turned as at the grasp.
   CycleFigures figures;
 };
 

@@ -160,8 +160,8 @@ that the program runs on.
 * Modbus/TCP. The cell is the server (`plc.listen` of the cell file, usually port 502), the PLC is the client. Any unit id. With
   `plc.role = "client"` it is the other way round: [see below](#the-other-way-round-the-plc-is-the-server).
 * Functions 3 and 4 read (both the same words), 6, 16 and 23 write, 8/0 echoes. Everything else is refused.
-* **Write the whole request block** (words 0 … 7) with one function 16, in every poll. **Read status and result** (words 8 … 81,
-  74 words) with one function 3, in every poll. A poll of 20 … 100 ms is right.
+* **Write the whole request block** (words 0 … 7) with one function 16, in every poll. **Read status and result** (words 8 … 87,
+  80 words) with one function 3, in every poll. A poll of 20 … 100 ms is right.
 * Peers other than this machine itself have to stand in `plc.allow`.
 * One client writes: the first that does. A second one may read; its writes are refused with exception 6 until the first one
   has closed or has been silent for 2 s.
@@ -183,12 +183,12 @@ that the program runs on.
 With `plc.role = "client"` the cell connects to a Modbus server in the PLC (`plc.address`; MB_SERVER of an S7, a server add-on
 instruction of a Logix) and asks for unit `plc.unit_id`. The PLC keeps the same map in its holding registers, from
 `plc.base_address` on, and the same handshake: what this page calls writing is then setting words 0 … 7, and reading is looking at
-words 8 … 81.
+words 8 … 87.
 
-* Every `plc.poll_ms` the cell reads all 82 words with one function 3. What has changed in the request block counts when two reads
+* Every `plc.poll_ms` the cell reads all 88 words with one function 3. What has changed in the request block counts when two reads
   agree on it, `plc_heartbeat` apart; a raised `request` stands until `ack`, so nothing is missed.
-* The cell writes with function 16, words 8 … 39 or 8 … 81 in one request and word 17, `status`, once more alone: a flag falls before
-  the words that it speaks for change, and rises when all of them are there. Nobody else writes words 8 … 81; the cell reads them
+* The cell writes with function 16, words 8 … 39 or 8 … 87 in one request and word 17, `status`, once more alone: a flag falls before
+  the words that it speaks for change, and rises when all of them are there. Nobody else writes words 8 … 87; the cell reads them
   back, says in its log that somebody did, and writes them anew.
 * **Raise `request` only while `ack` is 0**: else the cell, which looks now and then, may not have seen the last one fall.
 * After connecting, the cell writes everything anew before it believes anything in the request block. A request that stands then and
@@ -203,9 +203,9 @@ words 8 … 81.
 constexpr std::string_view kPick = R"(## One pick, step by step
 
 Keep a copy of the request block in the PLC, write all eight words in every poll with `plc_heartbeat` counted up (at least once
-a second), and read words 8 … 81 in every poll. All signals are levels: hold each until you see its answer.
+a second), and read words 8 … 87 in every poll. All signals are levels: hold each until you see its answer.
 
-1. After connecting, once: `map_version` = 1, `map_length` = 82, `test_f32` = 123456.0. Else stop: program and map, or the
+1. After connecting, once: `map_version` = 2, `map_length` = 88, `test_f32` = 123456.0. Else stop: program and map, or the
    word order, do not fit. Read `ack_sequence` and `boot_count`.
 2. Write the block with `control` = 0 (or 8: `robot_clear`) once. A request that already stands when the cell has just started
    is not carried out (result code 30); it has to be seen 0 first.
@@ -225,8 +225,8 @@ a second), and read words 8 … 81 in every poll. All signals are levels: hold e
 8. Wait until `result_valid` (bit 3) is 1 and both `result_sequence` and `result_sequence_tail` are your number. If `fault` (bit 5)
    rises instead, no result comes: go to "After a fault". If your own time-out passes (longer than `plc.scan_timeout_ms` and
    `plc.detect_timeout_ms` together: 25 s fits the defaults), go to "Abort".
-9. Look at `result_code`. 1: take `grasp_x` … `grasp_c` and `approach_x` … `approach_c`, or let the robot fetch the pick of
-   this `pick_id` over its socket. Any other code: the table of result codes says what it means and what to do. Whether the
+9. Look at `result_code`. 1: take `approach_x` … `approach_c`, `grasp_x` … `grasp_c` and `retreat_x` … `retreat_z`, or let the robot
+   fetch the pick of this `pick_id` over its socket. Any other code: the table of result codes says what it means and what to do. Whether the
    robot then succeeded stands in no register: the robot tells its own PLC.
 10. Write `result_ack` = your number. The cell clears the result (`result_valid` = 0) and is `ready` again. Without this the result
     stays; it never expires by itself, and the next request clears it, too.
@@ -236,8 +236,8 @@ The same in bytes, request 5 for part 1 in supply 1 (transaction numbers left ou
     write  tt tt 00 00 00 17 FF 10 00 00 00 08 10  00 2A 00 05 00 01 00 01 00 00 00 00 00 00 00 09
            heartbeat 42, sequence 5, part 1, supply 1, result_ack 0, 0, 0, control = request + robot_clear
     answer tt tt 00 00 00 06 FF 10 00 00 00 08
-    read   tt tt 00 00 00 06 FF 03 00 08 00 4A
-    answer tt tt 00 00 00 97 FF 03 94  … 74 words from `map_version` to `result_sequence_tail`
+    read   tt tt 00 00 00 06 FF 03 00 08 00 50
+    answer tt tt 00 00 00 A3 FF 03 A0  … 80 words from `map_version` to `result_sequence_tail`
 
 ### Retry
 
@@ -274,7 +274,8 @@ The cell watches `plc_heartbeat` likewise (`plc.heartbeat_timeout_ms`; 0: not).
 
 constexpr std::string_view kConventions = R"(### Pose conventions
 
-`approach_…` and `grasp_…` are the tcp in the robot's base. `plc.pose_convention` says how they are written:
+`approach_…`, `grasp_…` and `retreat_…` are the tcp in the robot's base. `plc.pose_convention` says how they are written. At the retreat
+position the tcp is turned as at the grasp: it has no angles of its own.
 
 | value | name | x y z | a b c | rotation |
 |---|---|---|---|---|
@@ -291,22 +292,22 @@ constexpr std::string_view kMakers = R"(## Siemens S7-1200/1500
 | job | MB_MODE | MB_DATA_ADDR | MB_DATA_LEN | MB_DATA_PTR |
 |---|---|---|---|---|
 | write | 2 | 40001 | 8 | request block, Array[0..7] of Word |
-| read | 0 | 40009 | 74 | status and result, Array[0..73] of Word |
+| read | 0 | 40009 | 80 | status and result, Array[0..79] of Word |
 
 Put the arrays into data blocks with standard access (`{ S7_Optimized_Access := 'FALSE' }`): the f32 at word n is the Real at byte
 2 · (n − 8) of the array that was read. Do not change inputs while BUSY is 1. `binpick export plc --for s7` writes all of this and the
 handshake as an SCL source: [plc/tia-portal.md](plc/tia-portal.md).
 
-With `plc.role = "client"` call MB_SERVER in every cycle instead, with a structure of the 82 words in a data block with standard access
+With `plc.role = "client"` call MB_SERVER in every cycle instead, with a structure of the 88 words in a data block with standard access
 as MB_HOLD_REG, and `plc.base_address` as HR_Start_Offset: `binpick export plc --for s7 --role client`.
 
 ## Rockwell Logix
 
-`plc.word_order = "logix"`. One transaction writes 8 words at address 0, one reads 74 words at address 8 into an INT array; COP from it
+`plc.word_order = "logix"`. One transaction writes 8 words at address 0, one reads 80 words at address 8 into an INT array; COP from it
 into a structure of INT, DINT and REAL: each 32-bit value of a block starts at an even word, so that the structure has no holes.
 `binpick export plc --for logix` writes the structures, tags and the handshake: [plc/studio-5000.md](plc/studio-5000.md).
 
-With `plc.role = "client"` the server's array of holding registers has the 82 words from `plc.base_address` on; the same program, written by
+With `plc.role = "client"` the server's array of holding registers has the 88 words from `plc.base_address` on; the same program, written by
 `--role client`, says what to copy where.
 )";
 }  // namespace
@@ -318,7 +319,7 @@ std::string registers_page() {
   out += "\n## Status block, cell → PLC (words 8 … 39)\n\n" + registers(kStatusFirst, kStatusLength);
   out += "\nBits of `status`:\n\n" + bits(kStatusBits);
   out += "\nBits of `not_ready`:\n\n" + bits(kNotReadyBits);
-  out += "\n## Result block, cell → PLC (words 40 … 81)\n\n";
+  out += "\n## Result block, cell → PLC (words 40 … 87)\n\n";
   out += "All words are 0 while `result_valid` is 0.\n\n" + registers(kResultFirst, kResultLength) + "\n";
   out += kConventions;
   out += kPick;

@@ -43,10 +43,13 @@ void RegisterImage::put_result(const PickRequest& request, const PickResult& res
   if (result.code == ResultCode::PickFound) {
     const auto approach = pose_numbers(result.T_base_approach.iso, convention);
     const auto grasp = pose_numbers(result.T_base_grasp.iso, convention);
+    const auto retreat = pose_numbers(result.T_base_retreat.iso, convention);
     for (std::uint16_t i = 0; i < 6; ++i) {
       put_long(static_cast<std::uint16_t>(at("approach_x") + 2 * i), static_cast<float>(approach[i]));
       put_long(static_cast<std::uint16_t>(at("grasp_x") + 2 * i), static_cast<float>(grasp[i]));
     }
+    for (std::uint16_t i = 0; i < 3; ++i)
+      put_long(static_cast<std::uint16_t>(at("retreat_x") + 2 * i), static_cast<float>(retreat[i]));
   }
   put(at("sweep_ms"), result.figures.sweep_ms);
   put(at("profiles"), result.figures.profiles);

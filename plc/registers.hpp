@@ -28,7 +28,7 @@ struct Bit {
   std::string_view help;
 };
 
-inline constexpr std::uint16_t kMapVersion = 1;
+inline constexpr std::uint16_t kMapVersion = 2;
 inline constexpr float kTestF32 = 123456.0F;           ///< 0x47F12000.
 inline constexpr std::uint32_t kTestU32 = 0x01020304;  ///< 0102 0304 high word first.
 
@@ -38,8 +38,8 @@ inline constexpr std::uint16_t kRequestLength = 8;
 inline constexpr std::uint16_t kStatusFirst = 8;
 inline constexpr std::uint16_t kStatusLength = 32;
 inline constexpr std::uint16_t kResultFirst = 40;
-inline constexpr std::uint16_t kResultLength = 42;
-inline constexpr std::uint16_t kMapLength = 82;
+inline constexpr std::uint16_t kResultLength = 48;
+inline constexpr std::uint16_t kMapLength = 88;
 inline constexpr std::size_t kAlarmListLength = 8;
 
 inline constexpr std::array kRegisters{
@@ -54,8 +54,8 @@ inline constexpr std::array kRegisters{
     Register{"request_reserved_6", 6, Type::U16, Direction::PlcToCell, "", "Write 0."},
     Register{"control", 7, Type::Bits, Direction::PlcToCell, "", "Control bits, the last word of the block: all else is there when request is seen."},
     // Status block, cell → PLC.
-    Register{"map_version", 8, Type::U16, Direction::CellToPlc, "", "Version of this map, 1. Check it once after connecting."},
-    Register{"map_length", 9, Type::U16, Direction::CellToPlc, "words", "Length of this map, 82. Check it once after connecting."},
+    Register{"map_version", 8, Type::U16, Direction::CellToPlc, "", "Version of this map, 2. Check it once after connecting."},
+    Register{"map_length", 9, Type::U16, Direction::CellToPlc, "words", "Length of this map, 88. Check it once after connecting."},
     Register{"test_f32", 10, Type::F32, Direction::CellToPlc, "", "Always 123456.0: 47F1 2000 with the high word first (S7), 2000 47F1 with the low word first (Logix)."},
     Register{"test_u32", 12, Type::U32, Direction::CellToPlc, "", "Always 16909060 (0x01020304): 0102 0304 with the high word first, 0304 0102 with the low word first."},
     Register{"boot_count", 14, Type::U16, Direction::CellToPlc, "", "Changes with every start of the cell controller."},
@@ -100,18 +100,21 @@ inline constexpr std::array kRegisters{
     Register{"approach_a", 56, Type::F32, Direction::CellToPlc, "rad or deg", "First angle: rx, W or O."},
     Register{"approach_b", 58, Type::F32, Direction::CellToPlc, "rad or deg", "Second angle: ry, P or A."},
     Register{"approach_c", 60, Type::F32, Direction::CellToPlc, "rad or deg", "Third angle: rz, R or T."},
-    Register{"grasp_x", 62, Type::F32, Direction::CellToPlc, "m or mm", "Grasp pose, likewise. Come straight down to the approach pose, go to the grasp in a straight line, lift straight up (docs/picking.md)."},
+    Register{"grasp_x", 62, Type::F32, Direction::CellToPlc, "m or mm", "Grasp pose, likewise. Come straight down to the approach pose, go to the grasp in a straight line, then in a straight line to the retreat position, then straight up (docs/picking.md)."},
     Register{"grasp_y", 64, Type::F32, Direction::CellToPlc, "m or mm", ""},
     Register{"grasp_z", 66, Type::F32, Direction::CellToPlc, "m or mm", ""},
     Register{"grasp_a", 68, Type::F32, Direction::CellToPlc, "rad or deg", ""},
     Register{"grasp_b", 70, Type::F32, Direction::CellToPlc, "rad or deg", ""},
     Register{"grasp_c", 72, Type::F32, Direction::CellToPlc, "rad or deg", ""},
-    Register{"sweep_ms", 74, Type::U16, Direction::CellToPlc, "ms", "Duration of the sweep."},
-    Register{"profiles", 75, Type::U16, Direction::CellToPlc, "", "Profiles of the sweep."},
-    Register{"points", 76, Type::U32, Direction::CellToPlc, "", "Measured points."},
-    Register{"hypotheses", 78, Type::U32, Direction::CellToPlc, "", "Hypotheses tested."},
-    Register{"detection_ms", 80, Type::U16, Direction::CellToPlc, "ms", "Duration of the detection."},
-    Register{"result_sequence_tail", 81, Type::U16, Direction::CellToPlc, "", "The same number as result_sequence; take the result only when both are equal."},
+    Register{"retreat_x", 74, Type::F32, Direction::CellToPlc, "m or mm", "Retreat position of the tcp, with the part; the angles stay those of the grasp. Often straight above it."},
+    Register{"retreat_y", 76, Type::F32, Direction::CellToPlc, "m or mm", ""},
+    Register{"retreat_z", 78, Type::F32, Direction::CellToPlc, "m or mm", ""},
+    Register{"sweep_ms", 80, Type::U16, Direction::CellToPlc, "ms", "Duration of the sweep."},
+    Register{"profiles", 81, Type::U16, Direction::CellToPlc, "", "Profiles of the sweep."},
+    Register{"points", 82, Type::U32, Direction::CellToPlc, "", "Measured points."},
+    Register{"hypotheses", 84, Type::U32, Direction::CellToPlc, "", "Hypotheses tested."},
+    Register{"detection_ms", 86, Type::U16, Direction::CellToPlc, "ms", "Duration of the detection."},
+    Register{"result_sequence_tail", 87, Type::U16, Direction::CellToPlc, "", "The same number as result_sequence; take the result only when both are equal."},
     // clang-format on
 };
 

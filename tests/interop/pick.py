@@ -45,7 +45,7 @@ class Plc:
         self.block[0] = (self.block[0] + 1) & 0xFFFF
         answer = self.client.write_registers(0, self.block, slave=255)
         expect(not answer.isError(), f"write refused: {answer}")
-        answer = self.client.read_holding_registers(8, 74, slave=255)
+        answer = self.client.read_holding_registers(8, 80, slave=255)
         expect(not answer.isError(), f"read refused: {answer}")
         self.words = answer.registers
         time.sleep(0.03)
@@ -80,7 +80,7 @@ class Plc:
         """Steps 1 and 2: do map and word order fit; show request 0 once; start from a clean state."""
         self.block[7] = ROBOT_CLEAR
         self.poll()
-        expect(self.word(8) == 1 and self.word(9) == 82, f"map version {self.word(8)}, length {self.word(9)}")
+        expect(self.word(8) == 2 and self.word(9) == 88, f"map version {self.word(8)}, length {self.word(9)}")
         expect(self.f32(10) == 123456.0, f"test_f32 is {self.f32(10)}")
         expect(self.u32(12) == 0x01020304, f"test_u32 is {self.u32(12):#x}")
         expect(self.word(34) == (0 if self.order == "s7" else 1), "word_order")
@@ -111,7 +111,7 @@ class Plc:
         """Step 8."""
         def there():
             expect(not self.status(FAULT), f"fault, first_alarm {self.word(20)}")
-            return self.status(RESULT_VALID) and self.word(40) == self.word(81) == self.block[1]
+            return self.status(RESULT_VALID) and self.word(40) == self.word(87) == self.block[1]
         self.wait("the result", there, seconds)
         return self.words[40 - 8:]
 
@@ -126,7 +126,7 @@ class ServingPlc(Plc):
     """The same program on registers of its own, which the cell reads and writes."""
 
     def connect(self, host, port):
-        self.registers = ModbusSequentialDataBlock(0, [0] * 82)
+        self.registers = ModbusSequentialDataBlock(0, [0] * 88)
         context = ModbusServerContext(ModbusSlaveContext(hr=self.registers, zero_mode=True), single=True)
         threading.Thread(target=StartTcpServer, kwargs={"context": context, "address": (host, port)}, daemon=True).start()
 
@@ -137,12 +137,12 @@ class ServingPlc(Plc):
         words = self.registers.getValues(8, 74)
         # A flag never stands over half of its words.
         if words[17 - 8] & RESULT_VALID:
-            expect(words[40 - 8] == words[81 - 8] != 0, f"result_valid over sequence {words[40 - 8]} and {words[81 - 8]}")
+            expect(words[40 - 8] == words[87 - 8] != 0, f"result_valid over sequence {words[40 - 8]} and {words[87 - 8]}")
         self.words = words
 
     def meet(self):
         self.block[7] = ROBOT_CLEAR
-        self.words = [0] * 74
+        self.words = [0] * 80
         self.wait("the cell to write its map", lambda: self.word(8) != 0, 20)
         super().meet()
 
@@ -162,13 +162,16 @@ def one_pick(plc, part, supply):
     if plc.word(41) == PICK_FOUND:
         grasp = [plc.f32(n) for n in range(62, 74, 2)]
         approach = [plc.f32(n) for n in range(50, 62, 2)]
+        retreat = [plc.f32(n) for n in range(74, 80, 2)]
         expect(plc.word(42) != 0, "a pick without a number")
         expect(0.0 <= plc.f32(48) <= 1.0, f"score {plc.f32(48)}")
         expect(grasp[:3] != [0.0, 0.0, 0.0] and approach[:3] != grasp[:3], "no poses")
+        expect(retreat[2] > grasp[2], f"the retreat position {retreat} is not above the grasp {grasp[:3]}")
         line += (f" pick {plc.word(42)} score {plc.f32(48):.3f} left {plc.word(45)} fill {plc.word(46)} %"
-                 f" grasp {' '.join(f'{v:.4f}' for v in grasp)}")
-    line += f" sweep {plc.word(74)} ms profiles {plc.word(75)} points {plc.u32(76)} hypotheses {plc.u32(78)}"
-    print(f"{line} detection {plc.word(80)} ms")
+                 f" grasp {' '.join(f'{v:.4f}' for v in grasp)}"
+                 f" retreat {' '.join(f'{v:.4f}' for v in retreat)}")
+    line += f" sweep {plc.word(80)} ms profiles {plc.word(81)} points {plc.u32(82)} hypotheses {plc.u32(84)}"
+    print(f"{line} detection {plc.word(86)} ms")
     plc.acknowledge(plc.block[1])
 
     # The same number again: the same answer, no second sweep.

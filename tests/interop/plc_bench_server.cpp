@@ -27,9 +27,10 @@ plc::PickResult pick(std::uint16_t pick_id, std::uint16_t part_id) {
   r.score = 0.96875;
   r.T_base_approach.iso.translation() = Eigen::Vector3d{1250, -125.5, 562.5};
   r.T_base_grasp.iso.translation() = Eigen::Vector3d{1250, -125.5, 462.5};
+  r.T_base_retreat.iso.translation() = Eigen::Vector3d{1275, -93.75, 562.5};
   // Pointing straight down: half a turn about x.
   const Eigen::Matrix3d down = Eigen::Vector3d{1, -1, -1}.asDiagonal();
-  r.T_base_approach.iso.linear() = r.T_base_grasp.iso.linear() = down;
+  r.T_base_approach.iso.linear() = r.T_base_grasp.iso.linear() = r.T_base_retreat.iso.linear() = down;
   r.figures = {300, 345, 123456, 789, 100};
   return r;
 }

@@ -252,8 +252,11 @@ PlcResult Plc::decode_result() const {
     r.approach[i] = f32(static_cast<std::uint16_t>(plc::at("approach_x") + 2 * i));
     r.grasp[i] = f32(static_cast<std::uint16_t>(plc::at("grasp_x") + 2 * i));
   }
+  for (std::uint16_t i = 0; i < 3; ++i) r.retreat[i] = f32(static_cast<std::uint16_t>(plc::at("retreat_x") + 2 * i));
   r.T_base_approach = to_transform(r.approach, options_.pose_convention);
   r.T_base_grasp = to_transform(r.grasp, options_.pose_convention);
+  r.T_base_retreat = to_transform({r.retreat[0], r.retreat[1], r.retreat[2], r.grasp[3], r.grasp[4], r.grasp[5]},
+                                  options_.pose_convention);
   r.figures = {word(plc::at("sweep_ms")), word(plc::at("profiles")), u32(plc::at("points")), u32(plc::at("hypotheses")),
                word(plc::at("detection_ms"))};
   return r;

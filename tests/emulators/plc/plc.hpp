@@ -46,8 +46,10 @@ struct PlcResult {
   float score = 0;
   std::array<float, 6> approach{};  ///< As in the registers, in the configured convention.
   std::array<float, 6> grasp{};
+  std::array<float, 3> retreat{};
   Transform<frame::Base, frame::Tcp> T_base_approach;  ///< The same as transforms, millimetres.
   Transform<frame::Base, frame::Tcp> T_base_grasp;
+  Transform<frame::Base, frame::Tcp> T_base_retreat;  ///< Turned as at the grasp.
   plc::CycleFigures figures;
 };
 

@@ -78,7 +78,7 @@ class Network:
 
     def words(self):
         """The whole map, as it stands."""
-        return self.client.read_holding_registers(self.base, 82, slave=255).registers
+        return self.client.read_holding_registers(self.base, 88, slave=255).registers
 
 
 class Registers(Network):
@@ -87,7 +87,7 @@ class Registers(Network):
 
     def __init__(self, host, port, base):
         super().__init__(host, port, base)
-        self.registers = [0] * 82
+        self.registers = [0] * 88
         self.listener = socket.create_server((host, port))
         self.listener.setblocking(False)
         self.peer, self.received = None, b""
@@ -141,14 +141,14 @@ class Registers(Network):
         function, address, count = struct.unpack(">BHH", pdu[:5])
         at = address - self.base
         if function == 3:
-            if at < 0 or at + count > 82:
+            if at < 0 or at + count > 88:
                 return bytes([0x83, 2])
             words = list(self.registers)
             if self.deaf:
                 words[7] &= ~1
             return struct.pack(f">BB{count}H", 3, 2 * count, *words[at:at + count])
         expect(function == 16 and len(pdu) == 6 + 2 * count and pdu[5] == 2 * count, f"the cell sends {pdu.hex()}")
-        if at < 8 or at + count > 82:
+        if at < 8 or at + count > 88:
             return bytes([0x90, 2])
         self.registers[at:at + count] = struct.unpack(f">{count}H", pdu[6:])
         result = self.registers[40:]
@@ -253,7 +253,7 @@ def check_constants(plc, make, exported):
     def value(name):
         at, kind = exported[name]
         return number(words, at, LONG.get(kind, "u16"), make)
-    expect((value("map_version"), value("map_length")) == (1, 82), "map_version, map_length")
+    expect((value("map_version"), value("map_length")) == (2, 88), "map_version, map_length")
     expect(value("test_f32") == 123456.0 and value("test_u32") == 0x01020304, "test values")
     expect(value("word_order") == (0 if make == "s7" else 1), "word_order")
     beat, end = value("cell_heartbeat"), time.monotonic() + 3

@@ -150,14 +150,14 @@ class Cpu(Memory):
         expect(int(c["LocalPort"]) == self.port and c["RemotePort"] == "0" and 1 <= int(c["ID"]) <= 4095, f"{c}")
         expect(service.offset == self.base, f"HR_Start_Offset is {service.offset}")
         area = self.get(inputs["MB_HOLD_REG"][1])
-        expect(isinstance(area, Structure) and area.layout.size == 2 * 82, "MB_HOLD_REG has not 82 words")
+        expect(isinstance(area, Structure) and area.layout.size == 2 * 88, "MB_HOLD_REG has not 88 words")
         answer = {"NDR": False, "DR": False, "ERROR": False, "STATUS": 0x7002}
         if self.argument(inputs["DISCONNECT"]):
             return answer
         first = service.offset
         words = [int.from_bytes(area.bytes()[i:i + 2], "big") for i in range(0, 16, 2)]
         self.exchange(16, first, words)
-        read = self.exchange(3, first + 8, 74)
+        read = self.exchange(3, first + 8, 80)
         if read is not None:
             area.fill(area.bytes()[:16] + b"".join(w.to_bytes(2, "big") for w in read))
         return answer

@@ -18,12 +18,12 @@ TEST(Client, TheFirstExchangeByteForByte) {
   rig.connect();
   ASSERT_EQ(rig.requests.size(), 3U);
   // transaction | protocol | length | unit | function | address | count | bytes
-  EXPECT_EQ(rig.requests[0], hex({0, 1, 0, 0, 0, 6, 255, 3, 0, 0, 0, 82}));
-  ASSERT_EQ(rig.requests[1].size(), 13U + 2 * 74);
+  EXPECT_EQ(rig.requests[0], hex({0, 1, 0, 0, 0, 6, 255, 3, 0, 0, 0, 88}));
+  ASSERT_EQ(rig.requests[1].size(), 13U + 2 * 80);
   EXPECT_TRUE(
-      std::ranges::equal(ByteView{rig.requests[1]}.first(13), hex({0, 2, 0, 0, 0, 155, 255, 16, 0, 8, 0, 74, 148})));
+      std::ranges::equal(ByteView{rig.requests[1]}.first(13), hex({0, 2, 0, 0, 0, 167, 255, 16, 0, 8, 0, 80, 160})));
   EXPECT_EQ(rig.requests[2], hex({0, 3, 0, 0, 0, 9, 255, 16, 0, 17, 0, 1, 2, 0, 1})) << "ready, last of all";
-  EXPECT_EQ(rig.words[at("map_version")], 1);
+  EXPECT_EQ(rig.words[at("map_version")], 2);
   EXPECT_EQ(rig.words[at("test_f32")], 0x47F1);
   EXPECT_EQ(rig.words[at("boot_count")], 7);
   EXPECT_TRUE(rig.session.told());
@@ -38,13 +38,13 @@ TEST(Client, BaseAddressUnitAndWordOrderAreTheCellFiles) {
   const TimePoint now{1000s};
   session.on_connected(now);
   session.on_deadline(now);
-  EXPECT_EQ(session.take_output(), hex({0, 1, 0, 0, 0, 6, 1, 3, 2, 0, 0, 82}));
-  Bytes reply = hex({0, 1, 0, 0, 0, 167, 1, 3, 164});
-  reply.resize(reply.size() + 164);
+  EXPECT_EQ(session.take_output(), hex({0, 1, 0, 0, 0, 6, 1, 3, 2, 0, 0, 88}));
+  Bytes reply = hex({0, 1, 0, 0, 0, 179, 1, 3, 176});
+  reply.resize(reply.size() + 176);
   session.on_bytes(reply, now);
   const Bytes write = session.take_output();
   ASSERT_GE(write.size(), 25U);
-  EXPECT_TRUE(std::ranges::equal(ByteView{write}.subspan(7, 6), hex({16, 2, 8, 0, 74, 148})));
+  EXPECT_TRUE(std::ranges::equal(ByteView{write}.subspan(7, 6), hex({16, 2, 8, 0, 80, 160})));
   EXPECT_TRUE(std::ranges::equal(ByteView{write}.subspan(17, 4), hex({0x20, 0x00, 0x47, 0xF1})));
 }
 
@@ -144,7 +144,7 @@ TEST(Client, DataGoBeforeTheirFlagAndFlagsFallBeforeTheirData) {
   }
   ASSERT_GE(writes.size(), 3U);
   EXPECT_EQ(writes[0], "17+1");
-  EXPECT_EQ(writes[1], "8+74");
+  EXPECT_EQ(writes[1], "8+80");
   EXPECT_EQ(writes[2], "17+1 ack");
 }
 
@@ -173,7 +173,7 @@ TEST(Client, WhoeverElseWritesTheCellsWordsIsNamedAndOverwritten) {
   for (int i = 0; i < 5; ++i) {
     rig.words[at("map_version")] = 9;
     rig.run_for(100ms);
-    EXPECT_EQ(rig.words[at("map_version")], 1);
+    EXPECT_EQ(rig.words[at("map_version")], 2);
   }
   EXPECT_EQ(log.count("192.168.0.10:502, unit 255: word 8 is not as it was written"), 1);
   EXPECT_EQ(rig.reopened, 0);

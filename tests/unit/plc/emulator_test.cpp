@@ -41,7 +41,7 @@ TEST(EmulatedPlcAsServer, ItsFirstAnswersByteForByte) {
   EXPECT_EQ(exchange(hex({0, 7, 0, 0, 0, 6, 1, 6, 0x01, 0x11, 0, 1})), hex({0, 7, 0, 0, 0, 6, 1, 6, 0x01, 0x11, 0, 1}));
   EXPECT_TRUE(plc.ready());
   // Past its area; a count of nothing; a function that it has not.
-  EXPECT_EQ(exchange(hex({0, 8, 0, 0, 0, 6, 1, 3, 0x01, 0x51, 0, 2})), hex({0, 8, 0, 0, 0, 3, 1, 0x83, 2}));
+  EXPECT_EQ(exchange(hex({0, 8, 0, 0, 0, 6, 1, 3, 0x01, 0x57, 0, 2})), hex({0, 8, 0, 0, 0, 3, 1, 0x83, 2}));
   EXPECT_EQ(exchange(hex({0, 8, 0, 0, 0, 6, 1, 3, 0x00, 0xFF, 0, 2})), hex({0, 8, 0, 0, 0, 3, 1, 0x83, 2}));
   EXPECT_EQ(exchange(hex({0, 9, 0, 0, 0, 6, 1, 3, 0x01, 0x00, 0, 0})), hex({0, 9, 0, 0, 0, 3, 1, 0x83, 3}));
   EXPECT_EQ(exchange(hex({0, 9, 0, 0, 0, 6, 1, 8, 0, 0, 0, 0})), hex({0, 9, 0, 0, 0, 3, 1, 0x88, 1}));
@@ -53,10 +53,10 @@ TEST(EmulatedPlcAsClient, ItsFirstFramesByteForByte) {
   Plc plc{o};
   const TimePoint t{10s};
   plc.on_connected(t);
-  // MBAP (transaction 1, protocol 0, length 6, unit 255), function 3, address 0x0108, 74 words.
-  EXPECT_EQ(plc.take_output(), hex({0, 1, 0, 0, 0, 6, 255, 3, 0x01, 0x08, 0, 74}));
-  Bytes answer = hex({0, 1, 0, 0, 0, 151, 255, 3, 148});
-  answer.resize(answer.size() + 148);
+  // MBAP (transaction 1, protocol 0, length 6, unit 255), function 3, address 0x0108, 80 words.
+  EXPECT_EQ(plc.take_output(), hex({0, 1, 0, 0, 0, 6, 255, 3, 0x01, 0x08, 0, 80}));
+  Bytes answer = hex({0, 1, 0, 0, 0, 163, 255, 3, 160});
+  answer.resize(answer.size() + 160);
   plc.on_bytes(answer, t);
   EXPECT_TRUE(plc.take_output().empty());
   ASSERT_EQ(plc.deadline(), t + 30ms);
@@ -66,7 +66,7 @@ TEST(EmulatedPlcAsClient, ItsFirstFramesByteForByte) {
   EXPECT_EQ(plc.take_output(),
             hex({0, 2, 0, 0, 0, 23, 255, 16, 0x01, 0x00, 0, 8, 16, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}));
   plc.on_bytes(hex({0, 2, 0, 0, 0, 6, 255, 16, 0x01, 0x00, 0, 8}), t + 31ms);
-  EXPECT_EQ(plc.take_output(), hex({0, 3, 0, 0, 0, 6, 255, 3, 0x01, 0x08, 0, 74}));
+  EXPECT_EQ(plc.take_output(), hex({0, 3, 0, 0, 0, 6, 255, 3, 0x01, 0x08, 0, 80}));
   // An answer under another transaction number is ignored until the time-out, as MB_CLIENT does.
   plc.on_bytes(hex({0, 9, 0, 0, 0, 3, 255, 0x83, 2}), t + 32ms);
   EXPECT_EQ(plc.deadline(), t + 31ms + 2s);
@@ -88,6 +88,7 @@ TEST_P(EmulatedPlc, OnePickInBothWordOrdersAndEachConvention) {
       Pair pair{cell, o};
       pair.next_result.T_base_grasp.iso.linear() =
           Eigen::AngleAxisd(2.5, Eigen::Vector3d{1, 2, -0.5}.normalized()).toRotationMatrix();
+      pair.next_result.T_base_retreat.iso = Eigen::Translation3d{30, -40, 90} * pair.next_result.T_base_grasp.iso;
       pair.plc.raise_request(2, 3);
       ASSERT_TRUE(pair.run_until([&] { return pair.plc.idle() && pair.plc.last_result(); }));
       EXPECT_EQ(pair.plc.map_problem(), "");
@@ -100,6 +101,7 @@ TEST_P(EmulatedPlc, OnePickInBothWordOrdersAndEachConvention) {
       EXPECT_EQ(result.figures.points, 68000U);
       EXPECT_EQ(result.figures.hypotheses, 312U);
       EXPECT_TRUE(result.T_base_grasp.iso.isApprox(pair.next_result.T_base_grasp.iso, 1e-5));
+      EXPECT_TRUE(result.T_base_retreat.iso.isApprox(pair.next_result.T_base_retreat.iso, 1e-5));
       EXPECT_TRUE(result.T_base_approach.iso.isApprox(pair.next_result.T_base_approach.iso, 1e-5));
       EXPECT_TRUE(pair.plc.ready());
       EXPECT_EQ(pair.accepted, std::vector<std::uint16_t>{1});

@@ -77,11 +77,12 @@ TEST(Export, AddressesFollowTheOptions) {
   const auto files = everything(options);
   const std::string& scl = content(files, "BinPick.scl");
   EXPECT_TRUE(has(scl, "MB_MODE := 2, MB_DATA_ADDR := 40201, MB_DATA_LEN := 8"));
-  EXPECT_TRUE(has(scl, "MB_MODE := 0, MB_DATA_ADDR := 40209, MB_DATA_LEN := 74"));
+  EXPECT_TRUE(has(scl, "MB_MODE := 0, MB_DATA_ADDR := 40209, MB_DATA_LEN := 80"));
   EXPECT_TRUE(has(scl, "connect.RemoteAddress.ADDR[2] := 1;"));
   EXPECT_TRUE(has(scl, "connect.RemotePort := 1502;"));
   EXPECT_TRUE(has(scl, "PT := T#41000ms"));
   EXPECT_TRUE(has(scl, "grasp_x : Real;   // 40263 (word 62), mm"));
+  EXPECT_TRUE(has(scl, "retreat_z : Real;   // 40279 (word 78), mm"));
   EXPECT_TRUE(has(content(files, "BinPick.st"), "t_answer.PRE := 41000;"));
   EXPECT_TRUE(has(content(files, "BinPick_Tags.CSV"), "function 16, address 200, 8 words"));
   // Five digits end at 49999.
@@ -104,7 +105,7 @@ TEST(Export, WhereTheCellIsTheClientThePlcServesTheMap) {
   EXPECT_TRUE(has(scl, "connect.ActiveEstablished := FALSE;") && has(scl, "connect.RemotePort := 0;") &&
               has(scl, "connect.LocalPort := 1502;") && has(scl, "connect.RemoteAddress.ADDR[2] := 1;"));
   EXPECT_TRUE(has(content(files, "BinPick_Tags.CSV"), "holding registers from address 200, 8 words"));
-  EXPECT_TRUE(has(content(files, "BinPick_Tags.CSV"), "holding registers from address 208, 74 words"));
+  EXPECT_TRUE(has(content(files, "BinPick_Tags.CSV"), "holding registers from address 208, 80 words"));
   EXPECT_TRUE(has(content(files, "BinPick.st"), "another program, the Modbus server, moves both arrays"));
   // The handshake is the same program, word for word.
   ExportOptions served = options;

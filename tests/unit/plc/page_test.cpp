@@ -17,6 +17,8 @@ TEST(Page, EveryLineHasWhatAReaderLooksFor) {
   const std::string page = registers_page();
   EXPECT_NE(page.find("| 17 | 40018 | 400018 | `status` | bits |"), std::string::npos);
   EXPECT_NE(page.find("| 62 | 40063 | 400063 | `grasp_x` | f32 | m or mm |"), std::string::npos);
+  EXPECT_NE(page.find("| 74 | 40075 | 400075 | `retreat_x` | f32 | m or mm |"), std::string::npos);
+  EXPECT_NE(page.find("| 87 | 40088 | 400088 | `result_sequence_tail` | u16 |"), std::string::npos);
   EXPECT_NE(page.find("| 11 | nothing found |"), std::string::npos);
   EXPECT_NE(page.find("| 102 | pivot without motor supply |"), std::string::npos);
   EXPECT_NE(page.find("Ready --> Scanning: NewRequest\n"), std::string::npos);

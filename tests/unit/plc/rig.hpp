@@ -133,6 +133,7 @@ class Rig {
     r.score = 0.875;
     r.T_base_approach.iso.translation() = Eigen::Vector3d{1000, -250, 500};
     r.T_base_grasp.iso.translation() = Eigen::Vector3d{1000, -250, 400};
+    r.T_base_retreat.iso.translation() = Eigen::Vector3d{1031.25, -312.5, 468.75};
     r.figures = {1200, 430, 68000, 312, 240};
     return r;
   }

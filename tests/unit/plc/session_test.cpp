@@ -46,6 +46,9 @@ TEST(Session, OnePickWordByWord) {
   EXPECT_EQ(f32(rig, at("approach_y")), -0.25F);
   EXPECT_EQ(f32(rig, at("approach_z")), 0.5F);
   EXPECT_EQ(f32(rig, at("grasp_z")), 0.4F);
+  EXPECT_EQ(f32(rig, at("retreat_x")), 1.03125F);
+  EXPECT_EQ(f32(rig, at("retreat_y")), -0.3125F);
+  EXPECT_EQ(f32(rig, at("retreat_z")), 0.46875F);
   EXPECT_EQ(rig.word(at("sweep_ms")), 1200);
   EXPECT_EQ(rig.word(at("profiles")), 430);
   EXPECT_EQ(rig.word(at("points")), 1);
@@ -86,6 +89,10 @@ TEST(Session, PosesInTheRobotsOwnWords) {
       EXPECT_NEAR(f32(rig, static_cast<std::uint16_t>(at("grasp_x") + 2 * i)), numbers[i],
                   2e-6 * std::max(1.0F, std::abs(numbers[i])))
           << static_cast<int>(convention) << " " << i;
+    const float unit = convention == PoseConvention::UniversalRobots ? 1e-3F : 1;
+    EXPECT_FLOAT_EQ(f32(rig, at("retreat_x")), 1031.25F * unit);
+    EXPECT_FLOAT_EQ(f32(rig, at("retreat_y")), -312.5F * unit);
+    EXPECT_FLOAT_EQ(f32(rig, at("retreat_z")), 468.75F * unit);
     EXPECT_EQ(rig.word(at("pose_convention")), static_cast<int>(convention));
   }
 }
