@@ -305,7 +305,7 @@ void Cell::publish(TimePoint now) {
       BINPICK_LOG(Info, "cell", "pick %u is a second try: a pick of object %zu failed before%s", pick_id_,
                   grasp.detection, pick->other ? "; by another grasp now" : "");
     robot_.offer({answer.pick_id, request_.sequence, request_.part_id, answer.objects_left, answer.T_base_approach,
-                  answer.T_base_grasp});
+                  answer.T_base_grasp, answer.T_base_retreat});
   } else {
     answer.objects_left = to_u16(static_cast<double>(found));
     answer.code = found > 0           ? plc::ResultCode::NotReachable

@@ -43,24 +43,34 @@ void append_real(std::string& out, const Format& format, double value, int decim
   out += text;
 }
 
-void append_pose(std::string& out, const Format& format, const Transform<frame::Base, frame::Tcp>& T_base_tcp) {
+// A robot must never see "nan" or a kilometre; poses come from our own detector and transforms.
+void append_position(std::string& out, const Format& format, const Transform<frame::Base, frame::Tcp>& T_base_tcp) {
   const Eigen::Vector3d position_mm = T_base_tcp.iso.translation();
-  const Eigen::Vector3d angles = format.to_angles(T_base_tcp.iso.linear());
-  // A robot must never see "nan" or a kilometre; poses come from our own detector and transforms.
-  BINPICK_CHECK(position_mm.allFinite() && position_mm.cwiseAbs().maxCoeff() < kLengthMax_mm && angles.allFinite());
-  for (int i = 0; i < 6; ++i) {
+  BINPICK_CHECK(position_mm.allFinite() && position_mm.cwiseAbs().maxCoeff() < kLengthMax_mm);
+  for (int i = 0; i < 3; ++i) {
     if (i > 0) out += ',';
-    if (i < 3)
-      append_real(out, format, position_mm[i] / format.mm_per_unit, format.length_decimals);
-    else
-      append_real(out, format, angles[i - 3], format.angle_decimals);
+    append_real(out, format, position_mm[i] / format.mm_per_unit, format.length_decimals);
   }
 }
 
-/// What stands behind field i (from 0) of an answer.
+void append_pose(std::string& out, const Format& format, const Transform<frame::Base, frame::Tcp>& T_base_tcp) {
+  append_position(out, format, T_base_tcp);
+  const Eigen::Vector3d angles = format.to_angles(T_base_tcp.iso.linear());
+  BINPICK_CHECK(angles.allFinite());
+  for (const double angle : angles) {
+    out += ',';
+    append_real(out, format, angle, format.angle_decimals);
+  }
+}
+
+// Fields of an answer, from 0.
+constexpr std::size_t kApproach = 6, kGrasp = 12, kRetreat = 18, kReported = 21;
+static_assert(kReported + 2 == kReplyFields);
+
+/// What stands behind field i of an answer.
 std::string_view separator(const Format& format, std::size_t i) {
   if (i + 1 == kReplyFields) return format.close;
-  return i == 5 || i == 11 ? format.pose_break : std::string_view{","};
+  return i + 1 == kApproach || i + 1 == kGrasp ? format.pose_break : std::string_view{","};
 }
 
 struct Word {
@@ -72,7 +82,10 @@ constexpr std::array kWords{Word{"hello", Request::Kind::Hello},  Word{"fetch", 
                             Word{"begin", Request::Kind::Begin},  Word{"end", Request::Kind::End},
                             Word{"broken", Request::Kind::Broken}};
 
-constexpr bool is_integer(std::size_t i) { return i < 6 || i >= 18; }
+constexpr bool is_integer(std::size_t i) { return i < kApproach || i >= kReported; }
+constexpr bool is_length(std::size_t i) {
+  return (i >= kApproach && i < kApproach + 3) || (i >= kGrasp && i < kGrasp + 3) || (i >= kRetreat && i < kReported);
+}
 
 /// A whole number of 0 … 65535, or a decimal fraction; nullopt for anything else.
 std::optional<double> read_number(std::string_view word, const Format& format, std::size_t i) {
@@ -83,7 +96,8 @@ std::optional<double> read_number(std::string_view word, const Format& format, s
   if (error != std::errc{} || end != word.data() + word.size() || !std::isfinite(value)) return std::nullopt;
   if (is_integer(i)) {
     if (value < 0 || value > 65535 || value != std::floor(value)) return std::nullopt;
-  } else if (i % 6 < 3 ? std::abs(value * format.mm_per_unit) >= kLengthMax_mm : std::abs(value) > format.angle_max) {
+  } else if (is_length(i) ? std::abs(value * format.mm_per_unit) >= kLengthMax_mm
+                          : std::abs(value) > format.angle_max) {
     return std::nullopt;
   }
   return value;
@@ -172,6 +186,8 @@ std::string encode(const Reply& reply, Dialect dialect) {
     out += format.pose_break;
     append_pose(out, format, *T_base_tcp);
   }
+  out += ',';
+  append_position(out, format, pick.T_base_retreat);
   add(",", reply.reported_id);
   add(",", static_cast<unsigned>(reply.outcome));
   return out.append(format.close).append(format.end);
@@ -204,25 +220,28 @@ Expected<std::optional<DecodedReply>, BadReply> decode_reply(std::string_view te
     if (end == std::string_view::npos) return incomplete();
     const auto number = read_number(text.substr(at, end - at), format, i);
     if (!number) return bad("field " + std::to_string(i + 1) + " is no number of its kind and range");
+    if (i == 0 && *number != kProtocolVersion)
+      return bad("protocol version is not " + std::to_string(kProtocolVersion));
     fields[i] = *number;
     at = end;
     const auto separated = take(separator(format, i));
     if (!separated) return incomplete();
     if (!*separated) return bad("not the " + std::to_string(kReplyFields) + " numbers of this dialect");
   }
-  if (fields[0] != kProtocolVersion) return bad("protocol version is not " + std::to_string(kProtocolVersion));
   const auto word = [&](std::size_t i) { return static_cast<std::uint16_t>(fields[i]); };
-  const auto pose = [&](std::size_t i) {
+  const auto pose = [&](std::size_t position, std::size_t angles) {
+    const auto three = [&](std::size_t i) { return Eigen::Vector3d{fields[i], fields[i + 1], fields[i + 2]}; };
     Transform<frame::Base, frame::Tcp> T_base_tcp;
-    T_base_tcp.iso.translation() = format.mm_per_unit * Eigen::Vector3d{fields[i], fields[i + 1], fields[i + 2]};
-    T_base_tcp.iso.linear() = format.from_angles({fields[i + 3], fields[i + 4], fields[i + 5]});
+    T_base_tcp.iso.translation() = format.mm_per_unit * three(position);
+    T_base_tcp.iso.linear() = format.from_angles(three(angles));
     return T_base_tcp;
   };
   DecodedReply decoded;
   decoded.reply = {static_cast<Status>(word(1)),
-                   {word(2), word(3), word(4), word(5), pose(6), pose(12)},
-                   word(18),
-                   static_cast<Outcome>(word(19))};
+                   {word(2), word(3), word(4), word(5), pose(kApproach, kApproach + 3), pose(kGrasp, kGrasp + 3),
+                    pose(kRetreat, kGrasp + 3)},
+                   word(kReported),
+                   static_cast<Outcome>(word(kReported + 1))};
   decoded.consumed = at;
   return std::optional{decoded};
 }

@@ -12,15 +12,15 @@
 #include "drivers/robot/session.hpp"
 
 /// The robot's line protocol. Pure functions: no socket, no clock, no log.
-/// The robot sends one line, the cell answers with twenty numbers, the same number of fields every time: before
+/// The robot sends one line, the cell answers with 23 numbers, the same number of fields every time: before
 /// PolyScope 5.15 a list variable of URScript cannot change its length, and a program of any make is simpler so. How
 /// numbers, poses and lines are written is the dialect's (dialect.hpp). The protocol is described for integrators in
 /// docs/robots/, one page for each make.
 namespace binpick::drivers::robot {
-inline constexpr int kProtocolVersion = 1;
+inline constexpr int kProtocolVersion = 2;
 /// Longest request without its line end. Strings of other makers' controllers hold 127 or 254 characters.
 inline constexpr std::size_t kLineBytesMax = 126;
-inline constexpr std::size_t kReplyFields = 20;
+inline constexpr std::size_t kReplyFields = 23;
 /// No coordinate of a pose is as large; supplies, poses and meshes of a cell file cannot add up to it.
 inline constexpr double kLengthMax_mm = 99'999;
 /// No answer is longer than this, line end included; a longer group is not ours.
@@ -71,7 +71,7 @@ class LineReader {
 /// Second field of an answer. Values below 50 are those of the PLC's result code where both say the same.
 enum class Status : std::uint16_t {
   NotReady = 0,     ///< No pick yet: ask again.
-  Pick = 1,         ///< Fields 3 … 18 hold.
+  Pick = 1,         ///< Fields 3 … 21 hold.
   ReportTaken = 2,  ///< The report is on record (also when it came twice).
   Hello = 3,
   Scan = 4,  ///< Carry the scanner: field "pick id" is the scan's number, field "part" the path's.
@@ -88,7 +88,8 @@ enum class Status : std::uint16_t {
 enum class Outcome : std::uint16_t { None = 0, Done = 1, Failed = 2 };
 
 /// One answer. Fields in order: protocol version, status, pick id, sequence, part, objects left, approach pose (6),
-/// grasp pose (6), pick id of the last report on record, its outcome. Poses are tcp in base.
+/// grasp pose (6), position of the retreat pose (3; turned as the grasp), pick id of the last report on record, its
+/// outcome. Poses are tcp in base.
 struct Reply {
   Status status = Status::NotReady;
   Pick pick;  ///< Default (all zero, identity) where there is none.
@@ -106,6 +107,7 @@ struct DecodedReply {
   Reply reply;
   std::size_t consumed = 0;
 };
-/// First answer in `text`; nullopt while it is incomplete. The robot's half, for emulators and tests.
+/// First answer in `text`; nullopt while it is incomplete. An answer of another protocol version is an error from its
+/// first field on, whatever its length. The robot's half, for emulators and tests.
 Expected<std::optional<DecodedReply>, BadReply> decode_reply(std::string_view text, Dialect dialect);
 }  // namespace binpick::drivers::robot

@@ -5,14 +5,14 @@
 
 #include "drivers/robot/session.hpp"
 
-/// All in which the makers' controllers differ: how numbers, poses and lines are written. The requests, the twenty
+/// All in which the makers' controllers differ: how numbers, poses and lines are written. The requests, the
 /// fields of an answer and their order are the same for all (codec.hpp).
 namespace binpick::drivers::robot {
 struct Format {
   std::string_view request_end;  ///< Behind a request, as the maker's program sends it; read are CR, LF and CR LF.
   std::string_view open, close;  ///< Around the fields; an answer is whole when `close` has come.
   std::string_view end;          ///< Behind `close`; the controller does not wait for it.
-  std::string_view pose_break;   ///< Between the heading, the approach pose, and the grasp pose with the last report.
+  std::string_view pose_break;   ///< Between the heading, the approach pose, and the rest: grasp, retreat, last report.
   int integer_width;             ///< Zeros in front up to this width; 0: as long as the number is.
   int real_width;                ///< The same for lengths and angles, decimals and sign included.
   double mm_per_unit;

@@ -29,6 +29,8 @@ struct Pick {
   std::uint16_t objects_left = 0;
   Transform<frame::Base, frame::Tcp> T_base_approach;
   Transform<frame::Base, frame::Tcp> T_base_grasp;
+  /// Turned as at the grasp. From the grasp in a straight line to here, and from here straight up.
+  Transform<frame::Base, frame::Tcp> T_base_retreat;
 };
 /// Why there is no pick to fetch.
 enum class NoPick : std::uint16_t { NotReady = 0, SupplyEmpty = 10, NothingFound = 11, NotReachable = 12, Fault = 40 };

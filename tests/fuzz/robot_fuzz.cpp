@@ -41,7 +41,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     now += std::chrono::seconds(step >> 6);
     if (step == 0x40) session.on_disconnected(now);
     if (step == 0x41) session.on_connected(now);
-    if (step == 0x42) session.offer({static_cast<std::uint16_t>(size | 1), 1, 1, 1, {}, {}});
+    if (step == 0x42) session.offer({static_cast<std::uint16_t>(size | 1), 1, 1, 1, {}, {}, {}});
     if (step == 0x43) session.withdraw(NoPick::SupplyEmpty);
     session.on_bytes(std::as_bytes(std::span{data + 1, length}), now);
     data += 1 + length;

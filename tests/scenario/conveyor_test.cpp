@@ -45,7 +45,8 @@ TEST_P(Conveyor, EveryObjectIsTakenFromTheStillBelt) {
     const auto T_supply_base = supply.T_base_supply.inverse();
     const GripResult result = emulators::grip(
         belt, *recipe.gripper, recipe.grasps, data->knowledge_bases.front().symmetry(),
-        {T_supply_base * pick.T_base_approach, T_supply_base * pick.T_base_grasp}, emulators::GripRules::of(part));
+        {T_supply_base * pick.T_base_approach, T_supply_base * pick.T_base_grasp, T_supply_base * pick.T_base_retreat},
+        emulators::GripRules::of(part));
     if (result.kind != GripResult::Kind::Taken) {
       std::printf("%s, seed %d: %s, %s\n", part.name.c_str(), static_cast<int>(seed),
                   recipe.grasps[result.grasp].name.c_str(), to_string(result).c_str());

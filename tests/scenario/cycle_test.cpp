@@ -64,7 +64,8 @@ TEST_P(WholePick, FromThePlcsRequestToTheRobotsReport) {
   EXPECT_EQ(grasped->pick_id, result->pick_id);
   EXPECT_EQ(grasped->sequence, result->sequence);
   for (const auto& [at_robot, at_plc] : {std::pair{grasped->T_base_grasp.iso, result->T_base_grasp.iso},
-                                         {grasped->T_base_approach.iso, result->T_base_approach.iso}}) {
+                                         {grasped->T_base_approach.iso, result->T_base_approach.iso},
+                                         {grasped->T_base_retreat.iso, result->T_base_retreat.iso}}) {
     const auto [mm, deg] = apart(at_robot, at_plc);
     EXPECT_LT(mm, 0.01);
     EXPECT_LT(deg, 0.001);
@@ -84,6 +85,11 @@ TEST_P(WholePick, FromThePlcsRequestToTheRobotsReport) {
   const auto [mm, deg] = apart(T_supply_grasp.iso, seen.choice.reachable.front().T_supply_grasp.iso);
   EXPECT_LT(mm, 0.01);
   EXPECT_LT(deg, 0.001);
+  const auto T_supply_retreat = data.config.supplies.front().T_base_supply.inverse() * grasped->T_base_retreat;
+  const auto [off_mm, off_deg] = apart(T_supply_retreat.iso, seen.choice.reachable.front().T_supply_retreat.iso);
+  EXPECT_LT(off_mm, 0.01);
+  EXPECT_LT(off_deg, 0.001);
+  EXPECT_GT(apart(grasped->T_base_retreat.iso, grasped->T_base_grasp.iso).first, 10) << "it is a way to go";
 }
 INSTANTIATE_TEST_SUITE_P(EachMake, WholePick,
                          testing::Values(Makes{"s7", "ur"}, Makes{"logix", "ur"}, Makes{"s7", "fanuc"},

@@ -123,12 +123,14 @@ std::optional<Bin::Nearest> Bin::nearest(const Transform<frame::Base, frame::Tcp
 }
 
 GripResult Bin::take(const Transform<frame::Base, frame::Tcp>& T_base_approach,
-                     const Transform<frame::Base, frame::Tcp>& T_base_grasp) {
+                     const Transform<frame::Base, frame::Tcp>& T_base_grasp,
+                     const Transform<frame::Base, frame::Tcp>& T_base_retreat) {
   GripResult result;
   if (part_.gripper) {
     const auto T_supply_base = supply_.T_base_supply.inverse();
     result = grip(pile_, *part_.gripper, part_.grasps, symmetry_,
-                  {T_supply_base * T_base_approach, T_supply_base * T_base_grasp}, GripRules::of(pile_.part()));
+                  {T_supply_base * T_base_approach, T_supply_base * T_base_grasp, T_supply_base * T_base_retreat},
+                  GripRules::of(pile_.part()));
   } else if (const auto found = nearest(T_base_grasp)) {
     result.object = found->object;
     const bool is_near = found->error.centroid_mm <= kGripMm && found->error.angle_rad <= kGripRad;

@@ -40,11 +40,12 @@ class Bin {
     vision::PoseDistance error;
   };
   std::optional<Nearest> nearest(const Transform<frame::Base, frame::Tcp>& T_base_grasp) const;
-  /// What comes of sending the gripper there by way of the approach pose (grip.hpp). A part file without a gripper says
-  /// too little for that: its objects are taken within 15 mm and 10 degrees. A taken object leaves the bin, and the
-  /// others settle again.
+  /// What comes of sending the gripper there by way of the approach pose, and out by way of the retreat pose
+  /// (grip.hpp). A part file without a gripper says too little for that: its objects are taken within 15 mm and 10
+  /// degrees. A taken object leaves the bin, and the others settle again.
   GripResult take(const Transform<frame::Base, frame::Tcp>& T_base_approach,
-                  const Transform<frame::Base, frame::Tcp>& T_base_grasp);
+                  const Transform<frame::Base, frame::Tcp>& T_base_grasp,
+                  const Transform<frame::Base, frame::Tcp>& T_base_retreat);
   /// The highest object goes. False when the bin is empty.
   bool take_highest();
 

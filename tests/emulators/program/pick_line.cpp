@@ -50,9 +50,11 @@ PickVerdict judge(const PickSeen& pick, double tolerance_mm, double tolerance_de
   if (pick.read) {
     const Eigen::Vector3d at = pick.read->T_base_grasp.iso.translation() * 1e-3;
     add(line, "robot read pick %u at (%.4f %.4f %.4f) m", pick.read->pick_id, at.x(), at.y(), at.z());
-    if (pick.result &&
-        (pick.result->T_base_grasp.iso.translation() - pick.read->T_base_grasp.iso.translation()).norm() >
-            kSamePoseMm) {
+    const auto differ = [](const auto& a, const auto& b) {
+      return (a.iso.translation() - b.iso.translation()).norm() > kSamePoseMm;
+    };
+    if (pick.result && (differ(pick.result->T_base_grasp, pick.read->T_base_grasp) ||
+                        differ(pick.result->T_base_retreat, pick.read->T_base_retreat))) {
       verdict.right = false;
       line += " (NOT WHAT THE PLC READ)";
     }

@@ -104,7 +104,7 @@ void Run::open_devices() {
                                       : daemon_at(config_.pose_listen, options_.daemon_host, "robot.pose_listen"),
           [this](TimePoint at) { return robot_->device.flange_at(at); }, options_.bin.seed);
     robot_->device.on_grasp = [this](const drivers::robot::Pick& pick) {
-      return close_gripper(picks_[pick.pick_id], pick.T_base_approach, pick.T_base_grasp);
+      return close_gripper(picks_[pick.pick_id], pick.T_base_approach, pick.T_base_grasp, pick.T_base_retreat);
     };
   }
   if (options_.devices.contains(Device::Plc)) {
@@ -246,7 +246,7 @@ void Run::turn_plc(TimePoint now) {
       } else if (now - step_since_ >= options_.pick_time) {
         // A real robot took it meanwhile; the emulated bin follows.
         Pick& pick = picks_[picking_];
-        close_gripper(pick, pick.result->T_base_approach, pick.result->T_base_grasp);
+        close_gripper(pick, pick.result->T_base_approach, pick.result->T_base_grasp, pick.result->T_base_retreat);
         plc.set_robot_clear(true);
         finish_pick(picking_, "", now);
       }
@@ -297,9 +297,10 @@ void Run::turn_robot(TimePoint now) {
 }
 
 bool Run::close_gripper(Pick& pick, const Transform<frame::Base, frame::Tcp>& T_base_approach,
-                        const Transform<frame::Base, frame::Tcp>& T_base_grasp) {
+                        const Transform<frame::Base, frame::Tcp>& T_base_grasp,
+                        const Transform<frame::Base, frame::Tcp>& T_base_retreat) {
   pick.nearest = bin_.nearest(T_base_grasp);
-  pick.grip = bin_.take(T_base_approach, T_base_grasp);
+  pick.grip = bin_.take(T_base_approach, T_base_grasp, T_base_retreat);
   return pick.grip->kind == GripResult::Kind::Taken;
 }
 

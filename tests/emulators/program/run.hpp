@@ -64,7 +64,8 @@ class Run {
   void turn_robot(TimePoint now);
   /// The gripper closes where the pick says; true: it holds the object.
   bool close_gripper(Pick& pick, const Transform<frame::Base, frame::Tcp>& T_base_approach,
-                     const Transform<frame::Base, frame::Tcp>& T_base_grasp);
+                     const Transform<frame::Base, frame::Tcp>& T_base_grasp,
+                     const Transform<frame::Base, frame::Tcp>& T_base_retreat);
   void finish_pick(std::uint16_t pick_id, const std::string& how, TimePoint now);
   void finish_as_counted();
   void tell_alarms();

@@ -75,7 +75,7 @@ TEST_F(EmulatedBin, WithoutAGripperWhatIsNearIsTaken) {
   const World::Object object = bin.world().objects().front();
   const auto take = [&](const Eigen::Isometry3d& moved) {
     const auto T = grasp_of(object, moved);
-    return bin.take(T, T).kind;
+    return bin.take(T, T, T).kind;
   };
   EXPECT_EQ(take(shift(400)), GripResult::Kind::Missed);
   EXPECT_EQ(take(turn(15)), GripResult::Kind::Missed);
@@ -97,13 +97,16 @@ TEST_F(EmulatedBin, TheGripperTakesWhatItsJawsEnclose) {
   };
   const auto grasp = std::ranges::find_if(grasps, from_above);
   ASSERT_NE(grasp, grasps.end());
-  const auto take = [&](double across_mm) {
+  const auto take = [&](double across_mm, const Eigen::Vector3d& way_out_mm = {0, 0, 100}) {
     const Transform<frame::Base, frame::Tcp> T{(T_base_object * grasp->T_object_tcp).iso *
                                                Eigen::Translation3d{across_mm, 0, 0}};
-    return bin.take({T.iso * Eigen::Translation3d{0, 0, -grasp->approach_mm}}, T).kind;
+    return bin
+        .take({T.iso * Eigen::Translation3d{0, 0, -grasp->approach_mm}}, T, {Eigen::Translation3d{way_out_mm} * T.iso})
+        .kind;
   };
   EXPECT_EQ(take(20), GripResult::Kind::Collision) << grasp->name << ": a jaw on the rim";
   EXPECT_EQ(take(70), GripResult::Kind::Missed) << grasp->name << ": the rim is beside both jaws";
+  EXPECT_EQ(take(3, {2000, 0, 100}), GripResult::Kind::Collision) << grasp->name << ": out through the wall";
   EXPECT_EQ(bin.objects_left(), 1U) << "it stays where it is";
   EXPECT_EQ(take(3), GripResult::Kind::Taken) << grasp->name;
   EXPECT_EQ(bin.objects_left(), 0U);
@@ -183,6 +186,10 @@ TEST(PickLine, GivesTheFiguresAndTheVerdict) {
   EXPECT_TRUE(judge(seen, 5, 3).taken);
   seen.read->T_base_grasp.iso.translation().x() += 0.2;
   EXPECT_FALSE(judge(seen, 5, 3).right) << "PLC and robot were told different things";
+  seen.read->T_base_grasp = result.T_base_grasp;
+  EXPECT_TRUE(judge(seen, 5, 3).right);
+  seen.read->T_base_retreat.iso.translation().z() += 0.2;
+  EXPECT_FALSE(judge(seen, 5, 3).right) << "different ways out";
   seen.read.reset();
   EXPECT_TRUE(judge(seen, 5, 3).right) << "a robot that is not played here is not judged";
   seen.nearest.reset();

@@ -32,11 +32,13 @@ class RobotPair : public testing::TestWithParam<Dialect> {
 
   void offer() {
     ++last_id;
-    Pick pick{last_id, last_id, 1, 5, {}, {}};
+    Pick pick{last_id, last_id, 1, 5, {}, {}, {}};
     pick.T_base_approach.iso.translation() = Eigen::Vector3d{-100, 200, 400};
     pick.T_base_approach.iso.linear() = from_wpr_deg({175, -12, -100});
     pick.T_base_grasp.iso.translation() = Eigen::Vector3d{100, 200, 300};
     pick.T_base_grasp.iso.linear() = from_wpr_deg({180, 0, 45});  // straight down
+    pick.T_base_retreat.iso.translation() = Eigen::Vector3d{130, 160, 390};
+    pick.T_base_retreat.iso.linear() = pick.T_base_grasp.iso.linear();
     session.offer(pick);
   }
 
@@ -178,6 +180,8 @@ TEST_P(RobotPair, ReadsThePoseThatWasOffered) {
       EXPECT_TRUE(read->pick.T_base_approach.iso.linear().isApprox(from_wpr_deg({175, -12, -100}), 1e-6));
       EXPECT_TRUE(read->pick.T_base_grasp.iso.translation().isApprox(Eigen::Vector3d{100, 200, 300}, 1e-9));
       EXPECT_TRUE(read->pick.T_base_grasp.iso.linear().isApprox(from_wpr_deg({180, 0, 45}), 1e-6));
+      EXPECT_TRUE(read->pick.T_base_retreat.iso.translation().isApprox(Eigen::Vector3d{130, 160, 390}, 1e-9));
+      EXPECT_TRUE(read->pick.T_base_retreat.iso.linear().isApprox(from_wpr_deg({180, 0, 45}), 1e-6));
     }
 }
 

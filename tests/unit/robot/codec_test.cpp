@@ -15,11 +15,13 @@ using Eigen::Vector3d;
 constexpr Dialect kUr = Dialect::UniversalRobots;
 
 Pick example_pick() {
-  Pick pick{17, 118, 2, 11, {}, {}};
+  Pick pick{17, 118, 2, 11, {}, {}, {}};
   pick.T_base_approach.iso.translation() = Vector3d{1234.5678, -250, 600.0004};
   pick.T_base_approach.iso.linear() = from_wpr_deg({180, 0, 45});
   pick.T_base_grasp.iso.translation() = Vector3d{1234.5678, -250, 500};
   pick.T_base_grasp.iso.linear() = from_wpr_deg({10, 20, 30});
+  pick.T_base_retreat.iso.translation() = Vector3d{1199.25, -210.5, 590};
+  pick.T_base_retreat.iso.linear() = pick.T_base_grasp.iso.linear();
   return pick;
 }
 
@@ -72,32 +74,35 @@ TEST(RobotCodec, WhatIsNoRequestSaysWhy) {
 }
 
 TEST(RobotCodec, AnswersAreTheseBytes) {
-  // version, status, pick id, sequence, part, left, approach, grasp, reported id, outcome
+  // version, status, pick id, sequence, part, left, approach, grasp, retreat (position), reported id, outcome
   EXPECT_EQ(encode(Reply{Status::NotReady, {}, 0, Outcome::None}, kUr),
-            "(1,0,0,0,0,0,"
+            "(2,0,0,0,0,0,"
             "0.000000,0.000000,0.000000,0.0000000,0.0000000,0.0000000,"
-            "0.000000,0.000000,0.000000,0.0000000,0.0000000,0.0000000,0,0)\n");
-  Pick pick{17, 118, 2, 11, {}, {}};
+            "0.000000,0.000000,0.000000,0.0000000,0.0000000,0.0000000,"
+            "0.000000,0.000000,0.000000,0,0)\n");
+  Pick pick{17, 118, 2, 11, {}, {}, {}};
   pick.T_base_approach.iso.translation() = Vector3d{1234.5678, -250, 600.0004};
   pick.T_base_approach.iso.linear() << 1, 0, 0, 0, -1, 0, 0, 0, -1;  // half a turn about x
   pick.T_base_grasp.iso.translation() = Vector3d{-0.0123, 0, 500};
   pick.T_base_grasp.iso.linear() << 0, -1, 0, 1, 0, 0, 0, 0, 1;  // a quarter of a turn about z
+  pick.T_base_retreat.iso.translation() = Vector3d{-0.0123, 120, 600.0004};
   EXPECT_EQ(encode(Reply{Status::Pick, pick, 16, Outcome::Failed}, kUr),
-            "(1,1,17,118,2,11,"
+            "(2,1,17,118,2,11,"
             "1.234568,-0.250000,0.600000,3.1415927,0.0000000,0.0000000,"
-            "-0.000012,0.000000,0.500000,0.0000000,0.0000000,1.5707963,16,2)\n");
+            "-0.000012,0.000000,0.500000,0.0000000,0.0000000,1.5707963,"
+            "-0.000012,0.120000,0.600000,16,2)\n");
 }
 
-TEST(RobotCodec, UrScriptReadsEveryAnswerAsTwentyNumbers) {
+TEST(RobotCodec, UrScriptReadsEveryAnswerAs23Numbers) {
   for (const Reply& reply : {Reply{}, Reply{Status::Pick, example_pick(), 16, Outcome::Done},
                              Reply{Status::UnknownPick, {}, 65535, Outcome::Failed}}) {
-    const auto list = socket_read_ascii_float(20, encode(reply, kUr));
-    ASSERT_EQ(list.size(), 21U);
-    EXPECT_EQ(list[0], 20);
-    EXPECT_EQ(list[1], 1);
+    const auto list = socket_read_ascii_float(23, encode(reply, kUr));
+    ASSERT_EQ(list.size(), 24U);
+    EXPECT_EQ(list[0], 23);
+    EXPECT_EQ(list[1], 2);
     EXPECT_EQ(list[2], static_cast<double>(reply.status));
   }
-  const auto list = socket_read_ascii_float(20, encode(Reply{Status::Pick, example_pick(), 16, Outcome::Done}, kUr));
+  const auto list = socket_read_ascii_float(23, encode(Reply{Status::Pick, example_pick(), 16, Outcome::Done}, kUr));
   EXPECT_EQ((std::vector<double>(list.begin() + 3, list.begin() + 7)), (std::vector<double>{17, 118, 2, 11}));
   // Metres; 180, 0, 45 of Fanuc is this rotation vector, 10, 20, 30 the other.
   const std::vector<double> approach{1.234568, -0.25, 0.6, 2.902453, 1.202235, 0};
@@ -106,8 +111,10 @@ TEST(RobotCodec, UrScriptReadsEveryAnswerAsTwentyNumbers) {
     EXPECT_NEAR(list[7 + i], approach[i], 1e-6) << i;
     EXPECT_NEAR(list[13 + i], grasp[i], 1e-6) << i;
   }
-  EXPECT_EQ(list[19], 16);
-  EXPECT_EQ(list[20], 1);
+  const std::vector<double> retreat{1.19925, -0.2105, 0.59};
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(list[19 + i], retreat[i], 1e-9) << i;
+  EXPECT_EQ(list[22], 16);
+  EXPECT_EQ(list[23], 1);
 }
 
 TEST(RobotCodec, AnswersNeverHoldAnExponentAndKeepAHundredthOfAMillimetre) {
@@ -120,6 +127,14 @@ TEST(RobotCodec, AnswersNeverHoldAnExponentAndKeepAHundredthOfAMillimetre) {
   ASSERT_TRUE(decoded && *decoded);
   EXPECT_LT(((*decoded)->reply.pick.T_base_grasp.iso.translation() - pick.T_base_grasp.iso.translation()).norm(), 1e-3);
   EXPECT_LE(text.size(), 255U) << "one string of a controller";
+  // The longest there can be.
+  Pick longest{65535, 65535, 65535, 65535, {}, {}, {}};
+  for (auto* T_base_tcp : {&longest.T_base_approach, &longest.T_base_grasp, &longest.T_base_retreat}) {
+    T_base_tcp->iso.translation().setConstant(-99'998.9994);
+    T_base_tcp->iso.linear() = from_rotation_vector({-1.7, -1.7, -1.7});
+  }
+  const Reply reply{Status::BadRequest, longest, 65535, Outcome::Failed};
+  EXPECT_EQ(encode(reply, kUr).size(), 1U + 1 + 1 + 2 + 4 * 6 + 15 * 11 + 1 + 5 + 1 + 1 + 1 + 1);
 }
 
 TEST(RobotCodec, DecodingGivesBackWhatWasEncoded) {
@@ -133,6 +148,7 @@ TEST(RobotCodec, DecodingGivesBackWhatWasEncoded) {
   EXPECT_EQ((*decoded)->reply.pick.pick_id, 17);
   EXPECT_EQ((*decoded)->reply.pick.objects_left, 11);
   EXPECT_TRUE((*decoded)->reply.pick.T_base_approach.iso.isApprox(reply.pick.T_base_approach.iso, 1e-5));
+  EXPECT_TRUE((*decoded)->reply.pick.T_base_retreat.iso.isApprox(reply.pick.T_base_retreat.iso, 1e-5)) << "turned too";
 }
 
 TEST(RobotCodec, EachPrefixOfAnAnswerWaitsForTheRest) {
@@ -156,6 +172,7 @@ TEST(RobotCodec, EachCorruptedByteOfAnAnswerIsAnErrorOrAValueInRange) {
         ++errors;
       } else if (*decoded) {
         EXPECT_TRUE((*decoded)->reply.pick.T_base_grasp.iso.matrix().allFinite());
+        EXPECT_TRUE((*decoded)->reply.pick.T_base_retreat.iso.matrix().allFinite());
         EXPECT_LE((*decoded)->consumed, corrupted.size());
       }
     }
@@ -168,8 +185,15 @@ TEST(RobotCodec, AnswersOfAnotherShapeAreRefused) {
   std::string endless = "(" + std::string(600, '1');
   EXPECT_FALSE(decode_reply(endless, kUr));
   std::string other_version = encode(Reply{}, kUr);
-  other_version[1] = '2';
+  other_version[1] = '3';
   EXPECT_FALSE(decode_reply(other_version, kUr));
+  // A cell of before the retreat pose: its answer is shorter, and it is the version that is told of.
+  const auto of_version_1 = decode_reply(
+      "(1,0,0,0,0,0,0.000000,0.000000,0.000000,0.0000000,0.0000000,0.0000000,"
+      "0.000000,0.000000,0.000000,0.0000000,0.0000000,0.0000000,0,0)\n",
+      kUr);
+  ASSERT_FALSE(of_version_1);
+  EXPECT_EQ(of_version_1.error().text, "protocol version is not 2");
 }
 
 TEST(LineReader, EachSplitGivesTheSameLines) {

@@ -18,11 +18,13 @@ using Eigen::Vector3d;
 constexpr std::array kDialects{Dialect::UniversalRobots, Dialect::Fanuc, Dialect::Kawasaki};
 
 Pick pick_at(const Matrix3d& R_approach, const Matrix3d& R_grasp) {
-  Pick pick{17, 118, 2, 11, {}, {}};
+  Pick pick{17, 118, 2, 11, {}, {}, {}};
   pick.T_base_approach.iso.translation() = Vector3d{1234.5678, -250, 600.0004};
   pick.T_base_approach.iso.linear() = R_approach;
   pick.T_base_grasp.iso.translation() = Vector3d{1234.5678, -250, 500};
   pick.T_base_grasp.iso.linear() = R_grasp;
+  pick.T_base_retreat.iso.translation() = Vector3d{1199.25, -210.5, 590};
+  pick.T_base_retreat.iso.linear() = pick.T_base_grasp.iso.linear();
   return pick;
 }
 Pick example_pick() { return pick_at(from_wpr_deg({175, -12, -100}), from_wpr_deg({10, 20, 30})); }
@@ -40,16 +42,19 @@ struct Telegram {
   std::string text;
 };
 
-// No pose, in each dialect: twelve numbers.
+// No pose, in each dialect: fifteen numbers.
 const std::string kUrZero =
     "0.000000,0.000000,0.000000,0.0000000,0.0000000,0.0000000,"
-    "0.000000,0.000000,0.000000,0.0000000,0.0000000,0.0000000";
+    "0.000000,0.000000,0.000000,0.0000000,0.0000000,0.0000000,"
+    "0.000000,0.000000,0.000000";
 const std::string kFanucZero = "000000.000,000000.000,000000.000,00000.0000,00000.0000,00000.0000";
-const std::string kKawasakiZero = "0.000,0.000,0.000,0.0000,0.0000,0.0000,0.000,0.000,0.000,0.0000,0.0000,0.0000";
+const std::string kFanucZeroPosition = "000000.000,000000.000,000000.000";
+const std::string kKawasakiZero =
+    "0.000,0.000,0.000,0.0000,0.0000,0.0000,0.000,0.000,0.000,0.0000,0.0000,0.0000,0.000,0.000,0.000";
 
 /// Every answer of each dialect, byte by byte. Fields: version, status, pick id, sequence, part, left, approach (6),
-/// grasp (6), reported id, outcome. The angles of the pick were computed apart from this code (base/rotation's test
-/// vectors to more decimals).
+/// grasp (6), retreat (3, position only), reported id, outcome. The angles of the pick were computed apart from this
+/// code (base/rotation's test vectors to more decimals).
 const std::vector<Telegram>& telegrams() {
   using enum Dialect;
   static const std::vector<Telegram> all = [] {
@@ -58,24 +63,27 @@ const std::vector<Telegram>& telegrams() {
         {"pick",
          UniversalRobots,
          {Status::Pick, example_pick(), 16, Outcome::Failed},
-         "(1,1,17,118,2,11,"                                            // heading
+         "(2,1,17,118,2,11,"                                            // heading
          "1.234568,-0.250000,0.600000,1.8690257,-2.2482907,0.0997368,"  // approach
          "1.234568,-0.250000,0.500000,0.0775253,0.3848516,0.4864792,"   // grasp
+         "1.199250,-0.210500,0.590000,"                                 // retreat
          "16,2)\n"},                                                    // last report
         // three lines of fixed columns, each ended by CR LF; x y z in mm, W P R in degrees
         {"pick",
          Fanuc,
          {Status::Pick, example_pick(), 16, Outcome::Failed},
-         "00001,00001,00017,00118,00002,00011\r\n"
+         "00002,00001,00017,00118,00002,00011\r\n"
          "001234.568,-00250.000,000600.000,00175.0000,-0012.0000,-0100.0000\r\n"
-         "001234.568,-00250.000,000500.000,00010.0000,00020.0000,00030.0000,00016,00002\r\n"},
+         "001234.568,-00250.000,000500.000,00010.0000,00020.0000,00030.0000,"
+         "001199.250,-00210.500,000590.000,00016,00002\r\n"},
         // one line ended by CR LF; x y z in mm, O A T in degrees
         {"pick",
          Kawasaki,
          {Status::Pick, example_pick(), 16, Outcome::Failed},
-         "1,1,17,118,2,11,"
+         "2,1,17,118,2,11,"
          "1234.568,-250.000,600.000,-122.8212,167.0141,157.7046,"
          "1234.568,-250.000,500.000,2.7268,22.2687,25.5056,"
+         "1199.250,-210.500,590.000,"
          "16,2\r\n"},
     };
     struct Short {
@@ -141,12 +149,12 @@ const std::vector<Telegram>& telegrams() {
                                               "65535,1",
                                               "65535,00001"}}) {
       list.push_back(
-          {s.what, UniversalRobots, s.reply, "(1," + std::string(s.heading) + "," + kUrZero + "," + s.last + ")\n"});
+          {s.what, UniversalRobots, s.reply, "(2," + std::string(s.heading) + "," + kUrZero + "," + s.last + ")\n"});
       list.push_back({s.what, Fanuc, s.reply,
-                      "00001," + std::string(s.fanuc_heading) + "\r\n" + kFanucZero + "\r\n" + kFanucZero + "," +
-                          s.fanuc_last + "\r\n"});
+                      "00002," + std::string(s.fanuc_heading) + "\r\n" + kFanucZero + "\r\n" + kFanucZero + "," +
+                          kFanucZeroPosition + "," + s.fanuc_last + "\r\n"});
       list.push_back(
-          {s.what, Kawasaki, s.reply, "1," + std::string(s.heading) + "," + kKawasakiZero + "," + s.last + "\r\n"});
+          {s.what, Kawasaki, s.reply, "2," + std::string(s.heading) + "," + kKawasakiZero + "," + s.last + "\r\n"});
     }
     return list;
   }();
@@ -193,8 +201,8 @@ std::vector<double> karel_reads(const std::string& text) {
   };
   for (std::size_t i = 0; i < 6; ++i) cut(0, 1 + 6 * i, 5);
   for (std::size_t i = 0; i < 6; ++i) cut(1, 1 + 11 * i, 10);
-  for (std::size_t i = 0; i < 6; ++i) cut(2, 1 + 11 * i, 10);
-  for (std::size_t i = 0; i < 2; ++i) cut(2, 67 + 6 * i, 5);
+  for (std::size_t i = 0; i < 9; ++i) cut(2, 1 + 11 * i, 10);
+  for (std::size_t i = 0; i < 2; ++i) cut(2, 100 + 6 * i, 5);
   return numbers;
 }
 
@@ -243,6 +251,9 @@ TEST(RobotDialect, EachAnswerIsTheseBytesAndIsReadBack) {
     EXPECT_EQ(reply.pick.objects_left, t.reply.pick.objects_left);
     EXPECT_EQ(reply.reported_id, t.reply.reported_id);
     EXPECT_EQ(reply.outcome, t.reply.outcome);
+    EXPECT_LT((reply.pick.T_base_retreat.iso.translation() - t.reply.pick.T_base_retreat.iso.translation()).norm(),
+              1e-9);
+    EXPECT_TRUE(reply.pick.T_base_retreat.iso.linear() == reply.pick.T_base_grasp.iso.linear());
     EXPECT_EQ(encode(reply, t.dialect), t.text);
   }
 }
@@ -288,6 +299,7 @@ TEST(RobotDialect, EachCorruptedByteOfEachAnswerIsAnErrorOrAValueInRange) {
           ASSERT_LE((*decoded)->consumed, corrupted.size());
           ASSERT_TRUE(in_range((*decoded)->reply.pick.T_base_approach)) << label(t) << " " << corrupted;
           ASSERT_TRUE(in_range((*decoded)->reply.pick.T_base_grasp)) << label(t) << " " << corrupted;
+          ASSERT_TRUE(in_range((*decoded)->reply.pick.T_base_retreat)) << label(t) << " " << corrupted;
         }
       }
     EXPECT_GT(errors, 200 * static_cast<int>(t.text.size())) << label(t);
@@ -308,36 +320,45 @@ TEST(RobotDialect, EndlessAnswersAndWrongCountsAreRefused) {
     EXPECT_FALSE(decode_reply(std::string(600, '1'), dialect));
     const std::string good = encode(Reply{}, dialect);
     const std::string bare = good.substr(0, good.size() - 2);
-    EXPECT_FALSE(decode_reply(bare + ",0\r\n", dialect)) << "21 numbers";
-    EXPECT_FALSE(decode_reply(bare.substr(0, bare.rfind(',')) + "\r\n", dialect)) << "19 numbers";
+    EXPECT_FALSE(decode_reply(bare + ",0\r\n", dialect)) << "24 numbers";
+    EXPECT_FALSE(decode_reply(bare.substr(0, bare.rfind(',')) + "\r\n", dialect)) << "22 numbers";
     std::string other_version = good;
-    other_version[good.find('1')] = '2';
+    other_version[good.find('2')] = '3';
     EXPECT_FALSE(decode_reply(other_version, dialect));
+    other_version[good.find('2')] = '1';
+    EXPECT_EQ(decode_reply(other_version.substr(0, 60), dialect).error().text, "protocol version is not 2");
   }
 }
 
 TEST(RobotDialect, FanucLinesHaveTheirColumnsWhateverTheNumbers) {
-  Pick pick{65535, 65535, 65535, 65535, {}, {}};
-  for (auto* T_base_tcp : {&pick.T_base_approach, &pick.T_base_grasp}) {
+  Pick pick{65535, 65535, 65535, 65535, {}, {}, {}};
+  for (auto* T_base_tcp : {&pick.T_base_approach, &pick.T_base_grasp, &pick.T_base_retreat}) {
     T_base_tcp->iso.translation() = Vector3d{-99'998.9996, 99'998.9996, -0.0001};
     T_base_tcp->iso.linear() = from_wpr_deg({-179.9999, -89.5, -123.4567});
   }
   for (const Reply& reply : {Reply{}, Reply{Status::BadRequest, pick, 65535, Outcome::Failed}}) {
     const std::string text = encode(reply, Dialect::Fanuc);
-    EXPECT_EQ(text.size(), 35U + 65U + 77U + 3U * 2U);
+    EXPECT_EQ(text.size(), 35U + 65U + 110U + 3U * 2U);
     EXPECT_EQ(text.find("\r\n"), 35U);
     EXPECT_EQ(text.find("\r\n", 37), 37U + 65U);
     EXPECT_EQ(karel_reads(text).size(), kReplyFields);
   }
-  EXPECT_LE(encode(Reply{Status::BadRequest, pick, 65535, Outcome::Failed}, Dialect::Kawasaki).size(), 255U);
+  for (auto* T_base_tcp : {&pick.T_base_approach, &pick.T_base_grasp, &pick.T_base_retreat}) {
+    T_base_tcp->iso.translation().setConstant(-99'998.9994);
+    T_base_tcp->iso.linear() = from_oat_deg({-123.4567, 123.4567, -123.4567});
+  }
+  const std::string kawasaki = encode(Reply{Status::BadRequest, pick, 65535, Outcome::Failed}, Dialect::Kawasaki);
+  EXPECT_EQ(kawasaki.size(), 2U + 3 + 4 * 6 + 9 * 11 + 2 * (10 + 9 + 10) + 6 + 1 + 2) << kawasaki;
+  EXPECT_LE(kawasaki.size(), 255U) << "one string of AS";
 }
 
 TEST(RobotDialect, TheControllersReadThePoseInTheirUnits) {
   const Reply reply{Status::Pick, example_pick(), 16, Outcome::Failed};
-  const std::vector<double> heading{1, 1, 17, 118, 2, 11};
-  const std::vector<double> fanuc{1234.568, -250, 600, 175, -12, -100, 1234.568, -250, 500, 10, 20, 30, 16, 2};
-  const std::vector<double> kawasaki{1234.568, -250, 600,    -122.8212, 167.0141, 157.7046, 1234.568,
-                                     -250,     500,  2.7268, 22.2687,   25.5056,  16,       2};
+  const std::vector<double> heading{2, 1, 17, 118, 2, 11};
+  const std::vector<double> fanuc{1234.568, -250, 600, 175,     -12,    -100, 1234.568, -250, 500,
+                                  10,       20,   30,  1199.25, -210.5, 590,  16,       2};
+  const std::vector<double> kawasaki{1234.568, -250,    600,     -122.8212, 167.0141, 157.7046, 1234.568, -250, 500,
+                                     2.7268,   22.2687, 25.5056, 1199.25,   -210.5,   590,      16,       2};
   for (const auto& [numbers, expected] : {std::pair{karel_reads(encode(reply, Dialect::Fanuc)), fanuc},
                                           {as_reads(encode(reply, Dialect::Kawasaki)), kawasaki}}) {
     ASSERT_EQ(numbers.size(), kReplyFields);
@@ -405,12 +426,16 @@ TEST(RobotDialect, TwentyThousandRandomPosesKeepTheResolutionOfTheText) {
     if (i % 10 == 0) R = from_oat_deg({36.0 * normal(random), 180 - 1e-5 * (i % 17), 36.0 * normal(random)});
     if (i % 10 == 5) R = from_wpr_deg({36.0 * normal(random), 90 - 1e-5 * (i % 17), 36.0 * normal(random)});
     Pick pick = pick_at(R, R);
-    pick.T_base_grasp.iso.translation() = Vector3d{coordinate_mm(random), coordinate_mm(random), coordinate_mm(random)};
+    for (auto* T_base_tcp : {&pick.T_base_grasp, &pick.T_base_retreat})
+      T_base_tcp->iso.translation() = Vector3d{coordinate_mm(random), coordinate_mm(random), coordinate_mm(random)};
     for (const Dialect dialect : kDialects) {
       const auto decoded = decode_reply(encode(Reply{Status::Pick, pick, 0, Outcome::None}, dialect), dialect);
       ASSERT_TRUE(decoded && *decoded) << i;
       const auto& T = (*decoded)->reply.pick.T_base_grasp.iso;
       ASSERT_LT((T.translation() - pick.T_base_grasp.iso.translation()).cwiseAbs().maxCoeff(), 0.00051) << i;
+      const auto& T_retreat = (*decoded)->reply.pick.T_base_retreat.iso;
+      ASSERT_LT((T_retreat.translation() - pick.T_base_retreat.iso.translation()).cwiseAbs().maxCoeff(), 0.00051) << i;
+      ASSERT_TRUE(T_retreat.linear() == T.linear());
       // Half a step of 0.0001 degrees in each of three angles, and once more where two become one.
       ASSERT_LT(angle_between(T.linear(), R), 4 * 0.00005 * 3.14159 / 180) << i << " " << static_cast<int>(dialect);
     }

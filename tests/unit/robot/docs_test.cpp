@@ -51,6 +51,7 @@ TEST(RobotDocs, TheProgramReadsAsManyNumbersAsAreSent) {
   const std::string page = read_page();
   EXPECT_NE(page.find("socket_read_ascii_float(" + std::to_string(kReplyFields) + ", \"binpick\""), std::string::npos);
   EXPECT_NE(page.find("good = answer[0] == " + std::to_string(kReplyFields)), std::string::npos);
+  EXPECT_NE(page.find("if answer[1] != " + std::to_string(kProtocolVersion) + ":"), std::string::npos);
   const std::size_t list = page.find("answer = [");
   ASSERT_NE(list, std::string::npos);
   const std::string entries = page.substr(list, page.find(']', list) - list);
@@ -60,11 +61,13 @@ TEST(RobotDocs, TheProgramReadsAsManyNumbersAsAreSent) {
 
 namespace {
 Reply example() {
-  Pick pick{17, 118, 2, 11, {}, {}};
+  Pick pick{17, 118, 2, 11, {}, {}, {}};
   pick.T_base_approach.iso.translation() = Eigen::Vector3d{1234.5678, -250, 600.0004};
   pick.T_base_approach.iso.linear() = from_wpr_deg({175, -12, -100});
   pick.T_base_grasp.iso.translation() = Eigen::Vector3d{1234.5678, -250, 500};
   pick.T_base_grasp.iso.linear() = from_wpr_deg({10, 20, 30});
+  pick.T_base_retreat.iso.translation() = Eigen::Vector3d{1199.25, -210.5, 590};
+  pick.T_base_retreat.iso.linear() = pick.T_base_grasp.iso.linear();
   return {Status::Pick, pick, 16, Outcome::Failed};
 }
 
@@ -150,10 +153,24 @@ TEST(RobotDocs, TheKarelProgramCutsTheColumnsThatAreSent) {
     return columns;
   };
   EXPECT_EQ(in_order(numbers(page, "int_at\\(1, ([0-9]+)\\)")), starts(lines[0]));
-  const auto reals = numbers(page, "real_at\\(row, ([0-9]+)\\)");
-  EXPECT_EQ(reals, starts(lines[1]));
+  EXPECT_NE(page.find("IF int_at(1, 1) <> " + std::to_string(kProtocolVersion) + " THEN"), std::string::npos);
+  // The position of a pose from a column on, the angles always from the same columns.
+  const auto angles = numbers(page, "real_at\\(row, ([0-9]+)\\)");
+  std::vector<int> offsets = numbers(page, "real_at\\(row, first \\+ ([0-9]+)\\)");
+  ASSERT_EQ(offsets.size(), 2U);
+  ASSERT_NE(page.find("pose.x = real_at(row, first)\n"), std::string::npos);
+  offsets.insert(offsets.begin(), 0);
+  const auto cut_by = [&](const std::string& calls) {
+    std::set<int> columns(angles.begin(), angles.end());
+    for (const int first : numbers(page, calls))
+      for (const int offset : offsets) columns.insert(first + offset);
+    return std::vector<int>(columns.begin(), columns.end());
+  };
+  EXPECT_EQ(cut_by("pose_to\\(2, ([0-9]+), pr_approach\\)"), starts(lines[1]));
   const auto third = starts(lines[2]);
-  EXPECT_EQ(reals, (std::vector<int>(third.begin(), third.begin() + 6)));
+  EXPECT_EQ(cut_by("pose_to\\(3, ([0-9]+), pr_(?:grasp|retreat)\\)"),
+            (std::vector<int>(third.begin(), third.begin() + 9)));
+  EXPECT_EQ(numbers(page, "pose_to\\(3, ([0-9]+), pr_retreat\\)"), std::vector<int>{third[6]});
   EXPECT_EQ(numbers(page, "CNV_STR_INT\\(SUB_STR\\(line\\[row\\], column, ([0-9]+)\\)"), std::vector<int>{5});
   EXPECT_EQ(numbers(page, "CNV_STR_REAL\\(SUB_STR\\(line\\[row\\], column, ([0-9]+)\\)"), std::vector<int>{10});
   expect_requests(page, "ask\\('([a-z]+) ?'", kRequests);
@@ -197,9 +214,9 @@ TEST(RobotDocs, TheAsProgramTakesAsManyNumbersAsAreSent) {
   EXPECT_NE(page.find("IF .count == " + std::to_string(kReplyFields) +
                       " AND bp_f[1] == " + std::to_string(kProtocolVersion) + " THEN"),
             std::string::npos);
-  const auto fields = numbers(page, "bp_f\\[([0-9]+)\\](?= == 1|,|\\)|\n)");
+  const auto fields = numbers(page, "bp_f\\[([0-9]+)\\](?= == 2|,|\\)|\n)");
   const std::set<int> used(fields.begin(), fields.end());
-  for (int field = 7; field <= 18; ++field) EXPECT_TRUE(used.contains(field)) << field;
+  for (int field = 7; field <= 21; ++field) EXPECT_TRUE(used.contains(field)) << field;
   EXPECT_LE(*used.rbegin(), static_cast<int>(kReplyFields));
   expect_requests(page, "\\.\\$line = \"([a-z]+) ?\"", kRequests);
 }
@@ -240,6 +257,25 @@ TEST(RobotDocs, TheUrProgramOpensAndClosesItsBlocksAndCallsWhatIsThere) {
     EXPECT_EQ(count(code, (std::string{"\\bdef "} + name + "\\(").c_str()), 1) << name;
     EXPECT_GE(count(code, (std::string{"\\b"} + name + "\\(").c_str()), 2) << name << " is called nowhere";
   }
+}
+
+// In along the line, closed, aside to the retreat pose, straight up from there, on record before the arm moves.
+TEST(RobotDocs, EachProgramDrawsThePartOutByWayOfTheRetreatPose) {
+  expect_in_order(part_of(read_page(), "def pick():", "def to_path"),
+                  {"away = p[answer[19], answer[20], answer[21], answer[16], answer[17], answer[18]]",
+                   "binpick_open = floor(answer[3])", "movel(approach,", "movel(grasp,", "gripper_close()",
+                   "movel(away,", "movel(p[away[0], away[1], above[2], away[3], away[4], away[5]],", "movej(q_clear"});
+  const std::string fanuc = read_page("fanuc");
+  EXPECT_NE(fanuc.find("pr_retreat = 85\n"), std::string::npos);
+  expect_in_order(part_of(fanuc, "LBL[30:pick]", "LBL[35:refuse]"),
+                  {"R[88]=R[83]", "PR[84,3]=PR[81,3]+300", "L PR[81] ", "L PR[82] ", "RO[1]=ON", "L PR[85] ",
+                   "PR[83]=PR[85]", "PR[83,3]=PR[84,3]", "L PR[83] ", "J P[1]"});
+  const std::string as = read_page("kawasaki");
+  EXPECT_NE(as.find("POINT bp_away = TRANS(bp_f[19], bp_f[20], bp_f[21], bp_f[16], bp_f[17], bp_f[18])\n"),
+            std::string::npos);
+  expect_in_order(part_of(as, ".PROGRAM bppick", ".END"),
+                  {"bp_open = bp_pick", "LMOVE bp_appro", "LMOVE bp_grasp", "CLOSEI", "LMOVE bp_away",
+                   "SHIFT(bp_away BY 0, 0, DZ(.above) - DZ(bp_away))", "LMOVE .out", "JMOVE #bp_clear"});
 }
 
 // Fetched, on record, to the start, begin until it may go, along it, end until it is taken, off the record, clear.

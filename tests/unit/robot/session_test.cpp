@@ -14,9 +14,10 @@ using namespace std::chrono_literals;
 constexpr TimePoint kStart{1h};
 
 Pick pick(std::uint16_t id) {
-  Pick value{id, static_cast<std::uint16_t>(id + 100), 1, 9, {}, {}};
+  Pick value{id, static_cast<std::uint16_t>(id + 100), 1, 9, {}, {}, {}};
   value.T_base_approach.iso.translation() = Eigen::Vector3d{1000, 20, 400};
   value.T_base_grasp.iso.translation() = Eigen::Vector3d{1000, 20, 300};
+  value.T_base_retreat.iso.translation() = Eigen::Vector3d{1030, 20, 390};
   return value;
 }
 
