@@ -134,7 +134,7 @@ class ServingPlc(Plc):
         self.block[0] = (self.block[0] + 1) & 0xFFFF
         self.registers.setValues(0, self.block)
         time.sleep(0.03)
-        words = self.registers.getValues(8, 74)
+        words = self.registers.getValues(8, 80)
         # A flag never stands over half of its words.
         if words[17 - 8] & RESULT_VALID:
             expect(words[40 - 8] == words[87 - 8] != 0, f"result_valid over sequence {words[40 - 8]} and {words[87 - 8]}")
