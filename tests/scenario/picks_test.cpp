@@ -36,6 +36,25 @@ struct Picks : testing::Test {
         least = apart, nearest = object.id;
     return nearest;
   }
+  /// The retreat pose belongs to the grasp that was sent, be it the best one of an object (0) or the other one (1).
+  int expect_own_retreat(const drivers::robot::Pick& pick) const {
+    const Eigen::Isometry3d T_supply_base = data->config.supplies[0].T_base_supply.iso.inverse();
+    const auto at = [&](const auto& T_base_tcp, const auto& T_supply_tcp) {
+      return (T_supply_base * T_base_tcp.iso.translation() - T_supply_tcp.iso.translation()).norm() < 0.01;
+    };
+    for (const auto& one : cell.results().back().choice.reachable) {
+      if (at(pick.T_base_grasp, one.T_supply_grasp)) {
+        EXPECT_TRUE(at(pick.T_base_retreat, one.T_supply_retreat));
+        return 0;
+      }
+      if (one.other && at(pick.T_base_grasp, one.other->T_supply_grasp)) {
+        EXPECT_TRUE(at(pick.T_base_retreat, one.other->T_supply_retreat));
+        return 1;
+      }
+    }
+    ADD_FAILURE() << "a grasp that nobody chose";
+    return 0;
+  }
   bool robot_is_back() {
     return cell.run_until([&] { return cell.robot.clear_of_view() && cell.plc.ready(); });
   }
@@ -82,7 +101,9 @@ TEST_F(Picks, AnObjectThatCannotBeGrippedDoesNotHoldUpTheOthers) {
   ASSERT_NE(stubborn, 0);
   const auto take = cell.robot.on_grasp;
   std::vector<int> tried;
+  int by_others = 0;
   cell.robot.on_grasp = [&](const drivers::robot::Pick& pick) {
+    by_others += expect_own_retreat(pick);
     emulators::PlcResult as_result;
     as_result.T_base_grasp = pick.T_base_grasp;
     tried.push_back(object_of(as_result));
@@ -97,5 +118,6 @@ TEST_F(Picks, AnObjectThatCannotBeGrippedDoesNotHoldUpTheOthers) {
   EXPECT_EQ(result->code, plc::ResultCode::NotReachable);
   EXPECT_EQ(cell.world.objects().size(), 1) << "all others were taken";
   EXPECT_EQ(std::ranges::count(tried, stubborn), 2) << "and it was tried once more";
+  EXPECT_EQ(by_others, 1) << "by another grasp";
 }
 }  // namespace binpick::support
