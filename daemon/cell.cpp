@@ -304,6 +304,8 @@ void Cell::publish(TimePoint now) {
     if (pick->again)
       BINPICK_LOG(Info, "cell", "pick %u is a second try: a pick of object %zu failed before%s", pick_id_,
                   grasp.detection, pick->other ? "; by another grasp now" : "");
+    if (grasp.is_aslant)
+      BINPICK_LOG(Info, "cell", "pick %u is drawn out aslant: object %zu hangs in others", pick_id_, grasp.detection);
     robot_.offer({answer.pick_id, request_.sequence, request_.part_id, answer.objects_left, answer.T_base_approach,
                   answer.T_base_grasp, answer.T_base_retreat});
   } else {

@@ -113,7 +113,10 @@ nlohmann::json choice_to_json(const vision::GraspChoice& choice, const std::vect
     reachable.push_back({{"detection", one.detection},
                          {"grasp", grasps[one.grasp].name},
                          {"T_supply_grasp", rows_of(one.T_supply_grasp.iso.matrix())},
-                         {"T_supply_approach", rows_of(one.T_supply_approach.iso.matrix())}});
+                         {"T_supply_approach", rows_of(one.T_supply_approach.iso.matrix())},
+                         {"T_supply_retreat", rows_of(one.T_supply_retreat.iso.matrix())},
+                         {"is_aslant", one.is_aslant},
+                         {"covered_mm", one.covered_mm}});
   for (const auto& one : choice.unreachable)
     unreachable.push_back({{"detection", one.detection}, {"reason", one.reason}});
   return {{"reachable", reachable}, {"unreachable", unreachable}};

@@ -115,27 +115,26 @@ std::vector<Swept> room_of(const Gripper& gripper, const Grasp& grasp, const Eig
   return room;
 }
 
+bool meets(const Swept& body, const Mesh& part) {
+  Eigen::AlignedBox3d reach;
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    const Swept::Range range = body.along(Eigen::Vector3d::Unit(axis));
+    reach.min()[axis] = range.least;
+    reach.max()[axis] = range.greatest;
+  }
+  return std::ranges::any_of(part.triangles, [&](const auto& corners) {
+    std::array<Eigen::Vector3d, 3> triangle;
+    Eigen::AlignedBox3d box;
+    for (std::size_t k = 0; k < 3; ++k) box.extend(triangle[k] = part.vertices_mm[corners[k]].template cast<double>());
+    return reach.intersects(box) && body.meets(triangle);
+  });
+}
+
 bool hits_part(const Gripper& gripper, const Grasp& grasp, const Mesh& part, double slack_mm) {
   Grasp coming = grasp;
   coming.holding_mm = grasp.opening_mm;
-  const std::vector<Swept> room = room_of(gripper, coming, grasp.T_object_tcp.iso, -slack_mm);
-  std::vector<Eigen::AlignedBox3d> boxes;
-  for (const Swept& body : room) {
-    Eigen::AlignedBox3d& box = boxes.emplace_back();
-    for (Eigen::Index axis = 0; axis < 3; ++axis) {
-      const Swept::Range range = body.along(Eigen::Vector3d::Unit(axis));
-      box.min()[axis] = range.least;
-      box.max()[axis] = range.greatest;
-    }
-  }
-  for (const auto& corners : part.triangles) {
-    std::array<Eigen::Vector3d, 3> triangle;
-    Eigen::AlignedBox3d box;
-    for (std::size_t k = 0; k < 3; ++k) box.extend(triangle[k] = part.vertices_mm[corners[k]].cast<double>());
-    for (std::size_t i = 0; i < room.size(); ++i)
-      if (boxes[i].intersects(box) && room[i].meets(triangle)) return true;
-  }
-  return false;
+  return std::ranges::any_of(room_of(gripper, coming, grasp.T_object_tcp.iso, -slack_mm),
+                             [&](const Swept& body) { return meets(body, part); });
 }
 
 Contact contact(const Swept& body, const Heights& heights, const SupplyBox& supply, bool holes) {

@@ -15,6 +15,8 @@ std::vector<Swept> room_of(const Gripper& gripper, const Grasp& grasp, const Eig
 /// What sweeps it, tcp frame: jaws as thick as they move, then the body.
 std::vector<Gripper::Solid> sweepers_of(const Gripper& gripper, const Grasp& grasp);
 
+/// Whether a body meets the surface of a part; `body` in the part's frame.
+bool meets(const Swept& body, const Mesh& part);
 /// Whether the gripper hits the part itself on the way in. `slack_mm`: so deep it may.
 bool hits_part(const Gripper& gripper, const Grasp& grasp, const Mesh& part, double slack_mm);
 

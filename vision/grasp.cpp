@@ -8,8 +8,8 @@
 #include <limits>
 #include <numbers>
 
-#include "vision/clearance.hpp"
-#include "vision/overlaps.hpp"
+#include "vision/grasp_checks.hpp"
+#include "vision/ways_out.hpp"
 
 namespace binpick::vision {
 namespace {
@@ -18,15 +18,12 @@ constexpr double kRevolutionStep = 15 * kDegree;
 /// Probabilities closer than this are equal; then the higher object goes first, as nothing lies on it.
 constexpr double kProbabilityStep = 0.02;
 constexpr double kHoldsMm = 3, kHoldsRad = 3 * kDegree;
-/// More room than so many clearances is not asked for.
-constexpr std::array kRoom{4.0, 2.0, 1.0};
-/// The clearance where none is given, in standard deviations of a height. It is the least: where there is more room, a
-/// grasp goes first.
-constexpr double kClearanceNoises = 0.3;
 /// Free grasps of one detection that are looked at for more room.
 constexpr int kFreeMax = 12;
 /// Grasps elsewhere on the object that are looked at for one that is free as well.
 constexpr int kOthersMax = 24;
+/// Grasps and ways that are looked at for an object that has to be drawn out aslant.
+constexpr std::size_t kAslantMax = 12;
 constexpr double kSameWayMm = 10, kSameWayRad = 10 * kDegree;
 /// Tilts that differ by less than one over this are equal.
 constexpr double kTiltSteps = 1e5;
@@ -58,22 +55,18 @@ Eigen::Isometry3d about(const Eigen::Vector3d& centre_mm, const Eigen::Matrix3d&
   return T;
 }
 
-/// A grasp in one of its poses.
-struct Candidate {
-  std::size_t grasp = 0;
-  std::size_t pose = 0;  ///< Of poses_of().
-  Eigen::Isometry3d T_supply_tcp;
-  double tilt_rad = 0;
-};
-
-Eigen::Isometry3d approach_of(const Candidate& candidate, const std::vector<Grasp>& grasps) {
-  return candidate.T_supply_tcp * Eigen::Translation3d(0, 0, -grasps[candidate.grasp].approach_mm);
-}
-
 /// As far up as the approach pose stands off.
 Transform<frame::Supply, frame::Tcp> lifted(const Candidate& candidate, const std::vector<Grasp>& grasps,
                                             const Eigen::Vector3d& up) {
   return {Eigen::Translation3d{grasps[candidate.grasp].approach_mm * up} * candidate.T_supply_tcp};
+}
+
+/// Of a place in the base's frame.
+bool is_too_far(const Eigen::Vector3d& at_mm, const ReachLimits& limits) {
+  return limits.radius_max_mm > 0 && at_mm.norm() > limits.radius_max_mm;
+}
+bool is_too_near(const Eigen::Vector3d& at_mm, const ReachLimits& limits) {
+  return at_mm.head<2>().norm() < limits.axis_min_mm;
 }
 
 RejectedGrasp beyond_limits(const Candidate& candidate, const Grasp& grasp, const SupplyBox& supply,
@@ -89,9 +82,8 @@ RejectedGrasp beyond_limits(const Candidate& candidate, const Grasp& grasp, cons
     return rejected(Obstacle::Tilt, candidate.tilt_rad, limits.tilt_max_rad);
   for (const double back_mm : {0.0, grasp.approach_mm}) {
     const Eigen::Vector3d at = limits.T_base_supply.iso * (candidate.T_supply_tcp * Eigen::Vector3d(0, 0, -back_mm));
-    if (limits.radius_max_mm > 0 && at.norm() > limits.radius_max_mm)
-      return rejected(Obstacle::Reach, at.norm(), limits.radius_max_mm, "the base");
-    if (at.head<2>().norm() < limits.axis_min_mm)
+    if (is_too_far(at, limits)) return rejected(Obstacle::Reach, at.norm(), limits.radius_max_mm, "the base");
+    if (is_too_near(at, limits))
       return rejected(Obstacle::Reach, at.head<2>().norm(), limits.axis_min_mm, "the base's z axis");
   }
   if (supply.size_mm.x() <= 0 || supply.size_mm.y() <= 0) return found;
@@ -106,14 +98,6 @@ RejectedGrasp beyond_limits(const Candidate& candidate, const Grasp& grasp, cons
   return found;
 }
 
-/// Fine enough to tell how wide one object covers another, and no more than some hundred pixels across.
-double fine_pixel_mm(const GripperScene& scene) {
-  constexpr double kAcrossMax = 360;
-  Eigen::AlignedBox3f extents;
-  for (const auto& vertex : scene.part.vertices_mm) extents.extend(vertex);
-  return std::max(scene.image.pixel_mm / 3, static_cast<double>(extents.sizes().norm()) / kAcrossMax);
-}
-
 /// Of two rejected ones, that which got farther in the tests. Of those that leave the limits the one that does so
 /// least; the others come in the order of their rank.
 bool got_farther(const RejectedGrasp& a, const RejectedGrasp& b) {
@@ -125,163 +109,54 @@ bool got_farther(const RejectedGrasp& a, const RejectedGrasp& b) {
   return stage(a) < Obstacle::Itself && std::abs(a.value - a.limit) < std::abs(b.value - b.limit);
 }
 
-/// What one scan says of all its grasps.
-class Checks {
- public:
-  Checks(const DetectionReport& report, const std::vector<Grasp>& grasps, const SupplyBox& supply,
-         const ReachLimits& limits, const GripperScene& scene)
-      : report_{report},
-        grasps_{grasps},
-        supply_{supply},
-        scene_{scene},
-        clearance_mm_{limits.clearance_mm.value_or(kClearanceNoises * scene.noise_mm)},
-        part_{scene.part},
-        around_{scene.image, supply, part_, report.detections, scene.noise_mm},
-        holes_{limits.unmeasured == Unmeasured::Blocked},
-        highest_mm_{static_cast<double>(around_.highest_mm())},
-        overlaps_mm_{vision::overlaps_mm(part_, report.detections, fine_pixel_mm(scene))},
-        up_{limits.T_base_supply.iso.linear().transpose() * Eigen::Vector3d::UnitZ()},
-        hits_part_(grasps.size()) {
-    for (const Grasp& grasp : grasps) sweepers_.push_back(sweepers_of(scene.gripper, grasp));
-  }
-
-  /// Takes up the next detection.
-  void begin(std::size_t detection, const std::vector<Candidate>& candidates) {
-    detection_ = detection;
-    // As wide as anything of the gripper reaches that is not above all.
-    Eigen::AlignedBox2d window;
-    for (const Candidate& candidate : candidates)
-      for (const Gripper::Solid& solid : sweepers_[candidate.grasp]) {
-        const Eigen::AlignedBox3d box = box_of(solid, candidate, kRoom.front());
-        if (box.min().z() < highest_mm_) {
-          window.extend(Eigen::Vector2d{box.min().head<2>()});
-          window.extend(Eigen::Vector2d{box.max().head<2>()});
+/// Objects that hang in others and so cannot be lifted straight up: by a grasp along a way on which they pass them.
+void add_aslant(GraspChecks& checks, const std::vector<std::vector<Candidate>>& candidates,
+                const std::vector<Grasp>& grasps, const ReachLimits& limits, GraspChoice& choice) {
+  const std::vector<std::vector<WayOut>> ways = checks.ways_past_others();
+  const auto is_reached = [&](const Candidate& candidate, const WayOut& way) {
+    const Eigen::Vector3d at = limits.T_base_supply.iso * (candidate.T_supply_tcp.translation() + way.way_mm);
+    return !is_too_far(at, limits) && !is_too_near(at, limits);
+  };
+  /// Both from the same object, on ways that differ.
+  const auto is_other = [](const Reachable& first, const Candidate& candidate, const WayOut& way) {
+    const Eigen::Vector3d before = first.T_supply_retreat.iso.translation() - first.T_supply_grasp.iso.translation();
+    return !is_same_way({candidate.T_supply_tcp}, first.T_supply_grasp) ||
+           before.normalized().dot(way.way_mm.normalized()) < std::cos(kSameWayRad);
+  };
+  const auto taken_aslant = [&](std::size_t d) {
+    if (ways[d].empty() || candidates[d].empty()) return false;
+    checks.begin(d, candidates[d], ways[d]);
+    std::vector<Candidate> free;
+    for (const Candidate& candidate : candidates[d])
+      if (free.size() < kAslantMax && checks.is_free_in(candidate)) free.push_back(candidate);
+    std::optional<Reachable> found;
+    std::size_t passed = 0;
+    for (const WayOut& way : ways[d]) {
+      if (free.empty() || passed >= kAslantMax || (found && found->other)) break;
+      if (!checks.part_passes(way)) continue;
+      ++passed;
+      for (const Candidate& candidate : free) {
+        if (found && !is_other(*found, candidate, way)) continue;
+        if (!is_reached(candidate, way) || !checks.is_free_along(candidate, way)) continue;
+        const Reachable::Other taken{candidate.grasp,
+                                     {candidate.T_supply_tcp},
+                                     {approach_of(candidate, grasps)},
+                                     {Eigen::Translation3d{way.way_mm} * candidate.T_supply_tcp}};
+        if (found) {
+          found->other = taken;
+          break;
         }
-      }
-    if (slants_) {
-      // And as the part on its way out.
-      Eigen::AlignedBox3d part;
-      const Eigen::Isometry3d& T = report_.detections[detection].T_supply_object.iso;
-      for (const auto& vertex : scene_.part.vertices_mm) part.extend(T * vertex.cast<double>());
-      for (const Candidate& candidate : candidates) {
-        const Eigen::AlignedBox3d out = part.merged(part.translated(lift_mm(grasps_[candidate.grasp]) * up_));
-        window.extend(Eigen::Vector2d{out.min().head<2>()});
-        window.extend(Eigen::Vector2d{out.max().head<2>()});
+        found = Reachable{d, taken.grasp, taken.T_supply_grasp, taken.T_supply_approach, taken.T_supply_retreat};
+        found->covered_mm = checks.told_mm(way.covered_mm);
+        found->is_aslant = true;
       }
     }
-    if (window.isEmpty()) window.extend(Eigen::Vector2d{candidates.front().T_supply_tcp.translation().head<2>()});
-    // What stands beside it may hide something within.
-    const Eigen::Vector2d margin = Eigen::Vector2d::Constant(0.4 * std::min(highest_mm_, kHiddenMm));
-    heights_ = around_.without(detection, {window.min() - margin, window.max() + margin});
-    lower_side_.reset();
-    covered_mm_ = std::max(overlaps_mm_[detection], around_.covered_mm(detection));
-  }
-
-  /// None: it is free, with `clearance_mm` around it.
-  RejectedGrasp check(const Candidate& candidate, double& clearance_mm) {
-    RejectedGrasp found{detection_, candidate.grasp, candidate.pose};
-    const Grasp& grasp = grasps_[candidate.grasp];
-    std::optional<bool>& itself = hits_part_[candidate.grasp];
-    // Meshes are simplified by up to a third of the noise.
-    if (!itself) itself = hits_part(scene_.gripper, grasp, scene_.part, 0.2 + scene_.noise_mm / 3);
-    if (*itself) {
-      found.why = Obstacle::Itself;
-      return found;
-    }
-    if (covered_mm_ > kCoveredMaxNoises * scene_.noise_mm) {
-      found.why = Obstacle::Covered;
-      found.value = covered_mm_;
-      return found;
-    }
-    if (const Contact hit = contact_of_gripper(candidate, 1, holes_); hit.with != Obstacle::None) {
-      found.why = hit.with, found.value = hit.depth_mm;
-      return found;
-    }
-    if (slants_ && !lower_side_) lower_side_ = around_.lower_side(detection_);
-    if (slants_)
-      if (const Contact hit = contact_of_part(*lower_side_, scene_.image.origin_mm, up_, lift_mm(grasp),
-                                              kSlackNoises * scene_.noise_mm, heights_, supply_);
-          hit.with != Obstacle::None) {
-        found.why = hit.with, found.value = hit.depth_mm;
-        return found;
-      }
-    // Here what may stand in a hole counts in any case: if it is allowed, it is still the last choice.
-    for (const double times : kRoom)
-      if ((times == 1 && holes_) || contact_of_gripper(candidate, times, true).with == Obstacle::None) {
-        clearance_mm = times * clearance_mm_;
-        break;
-      }
-    return found;
-  }
-  /// How far others may reach over the detection; 0: hardly.
-  double covered_mm() const { return covered_mm_ > kCoveredNoises * scene_.noise_mm ? covered_mm_ : 0; }
-  bool is_tight(double clearance_mm) const { return clearance_mm <= clearance_mm_; }
-  bool is_roomy(double clearance_mm) const { return clearance_mm >= kRoom.front() * clearance_mm_; }
-
- private:
-  /// Something that a shadow hides deeper than this is not met by jaws.
-  static constexpr double kHiddenMm = 100;
-  static constexpr double kSlackNoises = 1;
-  /// What reaches farther over an object lies on it, and would be lifted with it; from the lesser width on it may.
-  static constexpr double kCoveredMaxNoises = 2, kCoveredNoises = 0.3;
-
-  /// To the approach pose, from the grasp.
-  Eigen::Vector3d way_in(const Candidate& candidate) const {
-    return -grasps_[candidate.grasp].approach_mm * candidate.T_supply_tcp.linear().col(2);
-  }
-  /// As far along up_ as the part has to pass.
-  double lift_mm(const Grasp& grasp) const {
-    constexpr double kSteepest = 0.1;
-    const double out_mm = std::max(highest_mm_, supply_.size_mm.z()) / std::max(up_.z(), kSteepest);
-    return grasp.retreat_mm > 0 ? grasp.retreat_mm : out_mm;
-  }
-  Eigen::AlignedBox3d box_of(const Gripper::Solid& solid, const Candidate& candidate, double times) const {
-    const Eigen::Isometry3d T = candidate.T_supply_tcp * solid.T_tcp_solid;
-    const Eigen::Vector3d half = T.linear().cwiseAbs() * (0.5 * solid.size_mm.array() + times * clearance_mm_).matrix();
-    const Eigen::AlignedBox3d end{T.translation() - half, T.translation() + half};
-    Eigen::AlignedBox3d box = end.merged(end.translated(way_in(candidate)));
-    if (!slants_) return box;
-    const Eigen::AlignedBox3d above = box.translated(lift_mm(grasps_[candidate.grasp]) * up_);
-    return box.merged(above);
-  }
-  /// The first that is found: jaws are asked before the body.
-  Contact contact_of_gripper(const Candidate& candidate, double times, bool holes) const {
-    for (const Gripper::Solid& solid : sweepers_[candidate.grasp]) {
-      if (box_of(solid, candidate, times).min().z() >= std::max(highest_mm_, supply_.size_mm.z())) continue;
-      const Swept in{solid, candidate.T_supply_tcp, way_in(candidate), times * clearance_mm_};
-      if (const Contact found = contact(in, heights_, supply_, holes); found.with != Obstacle::None) return found;
-      if (!slants_) continue;
-      // Down to the approach pose, and up from the grasp.
-      const Eigen::Vector3d lift = lift_mm(grasps_[candidate.grasp]) * up_;
-      for (const Eigen::Isometry3d& T : {approach_of(candidate, grasps_), candidate.T_supply_tcp}) {
-        const Swept upright{solid, T, lift, times * clearance_mm_};
-        if (const Contact found = contact(upright, heights_, supply_, holes); found.with != Obstacle::None)
-          return found;
-      }
-    }
-    return {};
-  }
-
-  const DetectionReport& report_;
-  const std::vector<Grasp>& grasps_;
-  const SupplyBox& supply_;
-  const GripperScene& scene_;
-  double clearance_mm_;
-  Rasteriser part_;
-  Surroundings around_;
-  bool holes_;  ///< Block the way.
-  double highest_mm_;
-  std::vector<double> overlaps_mm_;  ///< Of each detection: how far others reach over it.
-  Eigen::Vector3d up_;               ///< The arm's way out.
-  /// Where the supply stands level, a way straight up is as free as its beginning: all is solid from its surface down.
-  bool slants_ = up_.head<2>().norm() > 1e-3 || up_.z() < 0;
-  std::vector<std::vector<Gripper::Solid>> sweepers_;  ///< Of each grasp.
-  std::vector<std::optional<bool>> hits_part_;
-  std::size_t detection_ = 0;
-  Heights heights_;
-  std::optional<Template> lower_side_;
-  double covered_mm_ = 0;
-};
+    if (found) choice.reachable.push_back(*found);
+    return found.has_value();
+  };
+  std::erase_if(choice.unreachable,
+                [&](const Unreachable& one) { return one.why == Obstacle::Covered && taken_aslant(one.detection); });
+}
 
 /// Of a normal error, in the direction in which it is largest.
 double within(double limit, const Eigen::Matrix3d& covariance) {
@@ -319,10 +194,10 @@ std::vector<Eigen::Isometry3d> poses_of(const Grasp& grasp, const Transform<fram
 GraspChoice choose_grasps(const DetectionReport& report, const Symmetry& symmetry, const std::vector<Grasp>& grasps,
                           const SupplyBox& supply, const ReachLimits& limits, const GripperScene* scene) {
   const Eigen::Vector3d up = limits.T_base_supply.iso.linear().transpose() * Eigen::Vector3d::UnitZ();
-  std::optional<Checks> checks;
+  std::optional<GraspChecks> checks;
   if (scene != nullptr && !report.detections.empty()) checks.emplace(report, grasps, supply, limits, *scene);
   GraspChoice choice;
-  std::vector<Candidate> candidates;
+  std::vector<std::vector<Candidate>> candidates_of(report.detections.size());
   for (std::size_t d = 0; d < report.detections.size(); ++d) {
     RejectedGrasp farthest{d, 0, 0, Obstacle::NoGrasp};
     const auto reject = [&](RejectedGrasp rejected) {
@@ -330,7 +205,7 @@ GraspChoice choose_grasps(const DetectionReport& report, const Symmetry& symmetr
       if (got_farther(rejected, farthest)) farthest = rejected;
       choice.rejected.push_back(rejected);
     };
-    candidates.clear();
+    std::vector<Candidate>& candidates = candidates_of[d];
     for (std::size_t g = 0; g < grasps.size(); ++g) {
       std::size_t pose = 0;
       for (const Eigen::Isometry3d& T : poses_of(grasps[g], report.detections[d].T_supply_object, symmetry)) {
@@ -392,10 +267,14 @@ GraspChoice choose_grasps(const DetectionReport& report, const Symmetry& symmetr
     else
       choice.unreachable.push_back({d, farthest.why, to_string(farthest)});
   }
+  const bool is_sure =
+      std::ranges::any_of(choice.reachable, [](const Reachable& one) { return one.covered_mm == 0 && !one.is_tight; });
+  if (checks && !is_sure) add_aslant(*checks, candidates_of, grasps, limits, choice);
   std::vector<long> holds;
   for (const Detection& d : report.detections)
     holds.push_back(std::lround(probability_of_holding(d, symmetry) / kProbabilityStep));
   std::stable_sort(choice.reachable.begin(), choice.reachable.end(), [&](const Reachable& a, const Reachable& b) {
+    if (a.is_aslant != b.is_aslant) return b.is_aslant;
     if (a.covered_mm != b.covered_mm) return a.covered_mm < b.covered_mm;
     if (a.is_tight != b.is_tight) return b.is_tight;
     if (holds[a.detection] != holds[b.detection]) return holds[a.detection] > holds[b.detection];

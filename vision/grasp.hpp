@@ -46,6 +46,7 @@ struct Reachable {
   double clearance_mm = 0;  ///< So much room is all around; 0: nobody asked, or only where holes are free.
   double covered_mm = 0;    ///< So far another one may reach over it: it would be lifted with it.
   bool is_tight = false;    ///< Hardly more room than the clearance.
+  bool is_aslant = false;   ///< The retreat pose does not stand above the grasp.
   /// For a second try: free too, and somewhere else on the object or from elsewhere.
   struct Other {
     std::size_t grasp = 0;
@@ -72,9 +73,10 @@ struct Unreachable {
   std::string reason;  ///< "tilt 51 deg is over 40 deg", "tcp 12 mm outside the wall x max".
 };
 struct GraspChoice {
-  /// At most one per detection, best first. Objects that another one may lie on come last, before them those with
-  /// hardly more room than the clearance. Else the surest to hold (in steps of 0.02), then the preferred grasp, then
-  /// the one with more room around it (up to four times the clearance), then the highest.
+  /// At most one per detection, best first. Objects that have to be drawn out aslant come last, before them those that
+  /// another one may lie on, before them those with hardly more room than the clearance. Else the surest to hold (in
+  /// steps of 0.02), then the preferred grasp, then the one with more room around it (up to four times the clearance),
+  /// then the highest.
   std::vector<Reachable> reachable;
   /// Detections without any reachable grasp, with the reason of the best one of those that got farthest in the tests.
   std::vector<Unreachable> unreachable;
@@ -93,7 +95,9 @@ struct GripperScene {
 
 /// Grasps are tried in every pose that the part's symmetry allows: preferred ones first, steep ones before tilted ones.
 /// Of those that are free the first with plenty of room is taken, or else the roomiest. Without a scene only the tcp is
-/// kept from the walls, and the steepest of the preferred is taken.
+/// kept from the walls, and the steepest of the preferred is taken. Where nothing has plenty of room straight up,
+/// objects that hang in others are offered with a retreat pose to which they can be drawn past them (ways_out.hpp);
+/// only in supplies that stand level.
 GraspChoice choose_grasps(const DetectionReport& report, const Symmetry& symmetry, const std::vector<Grasp>& grasps,
                           const SupplyBox& supply, const ReachLimits& limits, const GripperScene* scene = nullptr);
 }  // namespace binpick::vision

@@ -71,14 +71,27 @@ int square_px(const Slice& object, const Slice& other) {
 }
 }  // namespace
 
-std::vector<double> overlaps_mm(const Rasteriser& part, std::span<const Detection> detections, double pixel_mm) {
+std::vector<double> overlaps_mm(const Rasteriser& part, std::span<const Detection> detections, double pixel_mm,
+                                const Eigen::Vector3d& up) {
+  const Eigen::Quaterniond upright = Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ());
   Slicer slicer{part, pixel_mm};
   std::vector<Slice> slices;
-  for (const Detection& detection : detections) slices.push_back(slicer.slice(detection.T_supply_object.iso));
+  for (const Detection& detection : detections) slices.push_back(slicer.slice(upright * detection.T_supply_object.iso));
   std::vector<double> overlaps(detections.size(), 0);
   for (std::size_t a = 0; a < slices.size(); ++a)
     for (std::size_t b = 0; b < slices.size(); ++b)
       if (a != b) overlaps[a] = std::max(overlaps[a], pixel_mm * square_px(slices[a], slices[b]));
   return overlaps;
+}
+
+double overlap_mm(const Rasteriser& part, std::span<const Detection> detections, std::size_t detection,
+                  const Eigen::Isometry3d& T_supply_elsewhere, double pixel_mm) {
+  Slicer slicer{part, pixel_mm};
+  const Slice own = slicer.slice(T_supply_elsewhere);
+  double widest = 0;
+  for (std::size_t other = 0; other < detections.size(); ++other)
+    if (other != detection)
+      widest = std::max(widest, pixel_mm * square_px(own, slicer.slice(detections[other].T_supply_object.iso)));
+  return widest;
 }
 }  // namespace binpick::vision

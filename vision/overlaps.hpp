@@ -10,5 +10,11 @@
 namespace binpick::vision {
 /// Of each detection: how far others reach over it, in mm: the side of the largest square, seen from above, in which
 /// one of them stands higher than it. Poses alone count, not what was measured. A gap of less than `pixel_mm` is none.
-std::vector<double> overlaps_mm(const Rasteriser& part, std::span<const Detection> detections, double pixel_mm);
+/// `up`, of length 1: seen from there, higher is farther along it; what an object would meet on the way out.
+std::vector<double> overlaps_mm(const Rasteriser& part, std::span<const Detection> detections, double pixel_mm,
+                                const Eigen::Vector3d& up = Eigen::Vector3d::UnitZ());
+
+/// Of one detection if it stood elsewhere and the others where they are; seen from above.
+double overlap_mm(const Rasteriser& part, std::span<const Detection> detections, std::size_t detection,
+                  const Eigen::Isometry3d& T_supply_elsewhere, double pixel_mm);
 }  // namespace binpick::vision

@@ -39,6 +39,8 @@ class Surroundings {
 
   /// Of the window, which is cut to the picture.
   Heights without(std::size_t detection, const DepthWindow& window) const;
+  /// Of these heights, around `detection`, what no other detection explains or stands beside; there, all is free.
+  Heights foreign(Heights heights, std::size_t detection) const;
   float highest_mm() const;
   /// Side of the largest square of a detection, less a pixel, above which something lies that was not found.
   double covered_mm(std::size_t detection) const;

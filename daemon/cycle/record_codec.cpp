@@ -219,6 +219,10 @@ void put(FieldWriter& out, const vision::GraspChoice& choice) {
     o.isometry(reachable.T_supply_grasp.iso);
     o.isometry(reachable.T_supply_approach.iso);
     o.number(reachable.clearance_mm);
+    o.isometry(reachable.T_supply_retreat.iso);
+    o.number(reachable.covered_mm);
+    o.number(reachable.is_tight);
+    o.number(reachable.is_aslant);
   });
   out.list(choice.unreachable, [](FieldWriter& o, const vision::Unreachable& unreachable) {
     o.number(static_cast<std::uint32_t>(unreachable.detection));
@@ -242,6 +246,10 @@ void take(FieldReader& in, vision::GraspChoice& choice) {
     i.isometry(reachable.T_supply_grasp.iso);
     i.isometry(reachable.T_supply_approach.iso);
     i.number(reachable.clearance_mm);
+    i.isometry(reachable.T_supply_retreat.iso);
+    i.number(reachable.covered_mm);
+    i.number(reachable.is_tight);
+    i.number(reachable.is_aslant);
   });
   in.list(choice.unreachable, 9, [](FieldReader& i, vision::Unreachable& unreachable) {
     unreachable.detection = i.number<std::uint32_t>();

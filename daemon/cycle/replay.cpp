@@ -81,9 +81,15 @@ bool same(const vision::Rejection& a, const vision::Rejection& b) {
   return same(a.T_supply_object.iso, b.T_supply_object.iso) && same(a.score, b.score) && same(a.evidence, b.evidence) &&
          a.reason == b.reason;
 }
+/// Earlier records do not hold where the part was lifted to.
+bool is_recorded(const Eigen::Isometry3d& T_supply_retreat) {
+  return T_supply_retreat.matrix() != Eigen::Matrix4d::Identity();
+}
+/// `a` is the recorded one.
 bool same(const vision::Reachable& a, const vision::Reachable& b) {
   return a.detection == b.detection && a.grasp == b.grasp && same(a.T_supply_grasp.iso, b.T_supply_grasp.iso) &&
-         same(a.T_supply_approach.iso, b.T_supply_approach.iso);
+         same(a.T_supply_approach.iso, b.T_supply_approach.iso) &&
+         (!is_recorded(a.T_supply_retreat.iso) || same(a.T_supply_retreat.iso, b.T_supply_retreat.iso));
 }
 bool same(const vision::Unreachable& a, const vision::Unreachable& b) {
   return a.detection == b.detection && a.reason == b.reason;

@@ -105,7 +105,11 @@ TEST(RecordCodec, EveryFieldComesBack) {
   EXPECT_EQ(result.report.stages_ms.at("surface"), 2.5);
   EXPECT_TRUE(result.report.cut_short);
   EXPECT_EQ(result.report.first->hypotheses, 17U);
-  EXPECT_EQ(result.choice.reachable.at(0).grasp, 1U);
+  const vision::Reachable& reachable = result.choice.reachable.at(0);
+  EXPECT_EQ(reachable.grasp, 1U);
+  EXPECT_TRUE(reachable.T_supply_retreat.iso.isApprox(transform_of<frame::Supply, frame::Tcp>(1.3).iso));
+  EXPECT_EQ(reachable.covered_mm, 2.5);
+  EXPECT_TRUE(reachable.is_tight && reachable.is_aslant);
   EXPECT_EQ(result.choice.unreachable.at(0).reason, "tilt 51 deg is over 40 deg");
   EXPECT_TRUE(result.supply_empty);
   EXPECT_EQ(decoded->answer->registers, (std::vector<std::uint16_t>{1, 2, 65535}));

@@ -49,8 +49,15 @@ inline DetectResult result_of_all_fields() {
   result.report.cut_short = true;
   result.report.time_ms = 88.5;
   result.report.stages_ms = {{"maxima", 1.5}, {"surface", 2.5}};
-  result.choice.reachable = {
-      {0, 1, transform_of<frame::Supply, frame::Tcp>(1.1), transform_of<frame::Supply, frame::Tcp>(1.2), 0.9}};
+  vision::Reachable reachable{0,
+                              1,
+                              transform_of<frame::Supply, frame::Tcp>(1.1),
+                              transform_of<frame::Supply, frame::Tcp>(1.2),
+                              transform_of<frame::Supply, frame::Tcp>(1.3),
+                              0.9};
+  reachable.covered_mm = 2.5;
+  reachable.is_tight = reachable.is_aslant = true;
+  result.choice.reachable = {reachable};
   result.choice.unreachable = {{1, vision::Obstacle::Tilt, "tilt 51 deg is over 40 deg"}};
   result.choice.rejected = {{1, 2, 3, vision::Obstacle::Tilt, 0.9, 0.7, ""},
                             {0, 1, 0, vision::Obstacle::Wall, 12, 0, "wall x max"}};
