@@ -48,19 +48,21 @@ std::optional<PickMemory::Pick> PickMemory::next(const Place& place, const confi
       if (vision::gap_mm(footprints[moved[k]], footprints[d]) <= 0 && std::ranges::find(moved, d) == moved.end())
         moved.push_back(d);
   const std::size_t left = scan.result.report.detections.size() - scan.picked.size() - 1;
-  std::optional<Pick> again;
+  std::optional<Pick> again, last;
   for (std::size_t i = 0; i < scan.result.choice.reachable.size(); ++i) {
     const std::size_t detection = scan.result.choice.reachable[i].detection;
     if (std::ranges::any_of(moved, [&](std::size_t d) { return touches(d, detection); })) continue;
     const Failure* failure = failure_of(place, scan.result.centres_mm[detection]);
     if (failure == nullptr) return Pick{i, false, false, left};
-    // What was doubtful before it failed is no better the second time.
     const vision::Reachable& reachable = scan.result.choice.reachable[i];
-    if (!fresh || again || failure->picks >= (reachable.covered_mm > 0 ? 1 : kPicksMax)) continue;
+    if (!fresh || failure->picks >= kPicksMax) continue;
     const bool other = reachable.other && vision::is_same_way(reachable.T_supply_grasp, failure->T_supply_grasp);
-    again = Pick{i, true, other, left};
+    // What was doubtful before it failed is hardly better the second time.
+    const bool is_doubtful = reachable.covered_mm > 0 || reachable.is_aslant;
+    std::optional<Pick>& place_in_line = is_doubtful ? last : again;
+    if (!place_in_line && (other || !is_doubtful)) place_in_line = Pick{i, true, other, left};
   }
-  return again;
+  return again ? again : last;
 }
 
 void PickMemory::answered(const Place& place, const Pick& pick, std::uint16_t pick_id, const config::Picks& options) {

@@ -35,8 +35,9 @@ class PickMemory {
   };
   /// The next pick of the kept scan, if there is one: an object that stands apart (margin_mm) from all that were picked
   /// from this scan, from all that touched one of these, and from what overlaps with that, and of which no pick failed.
-  /// Only a fresh scan gives objects of which one pick failed, after all others, and not those that another one may lie
-  /// on; of which two failed, none until that is forgotten. Nothing is changed.
+  /// Only a fresh scan gives objects of which one pick failed, after all others; the last of them, and only by another
+  /// grasp, those that another one may lie on or that have to be drawn out aslant. Of which two failed, none until that
+  /// is forgotten. Nothing is changed.
   std::optional<Pick> next(const Place& place, const config::Picks& options, TimePoint now) const;
   /// It is answered under this id.
   void answered(const Place& place, const Pick& pick, std::uint16_t pick_id, const config::Picks& options);

@@ -123,17 +123,45 @@ TEST_F(PickMemoryTest, WhatFailedTwiceIsLeftAloneUntilItIsForgotten) {
   EXPECT_EQ(pick(), 0);
 }
 
-TEST_F(PickMemoryTest, WhatAnotherOneMayLieOnIsTriedOnce) {
-  DetectResult result = scan_of({0});
-  result.choice.reachable[0].covered_mm = 1;
-  memory.keep(kPlace, result, kScanned);
+TEST_F(PickMemoryTest, WhatAnotherOneMayLieOnIsTriedAgainOnlyByAnotherGrasp) {
+  for (const bool aslant : {false, true}) {
+    memory = {};
+    DetectResult result = scan_of({0});
+    result.choice.reachable[0].covered_mm = aslant ? 0 : 1;
+    result.choice.reachable[0].is_aslant = aslant;
+    memory.keep(kPlace, result, kScanned);
+    EXPECT_EQ(pick(), 0);
+    fail();
+    memory.keep(kPlace, result, kScanned);
+    EXPECT_EQ(pick(), std::nullopt);
+    result.choice.reachable[0].other = vision::Reachable::Other{};
+    memory.keep(kPlace, result, kScanned);
+    const auto again = memory.next(kPlace, options, kScanned);
+    ASSERT_TRUE(again);
+    EXPECT_TRUE(again->again && again->other);
+    result.choice.reachable[0].covered_mm = 0;
+    result.choice.reachable[0].is_aslant = false;
+    result.choice.reachable[0].other.reset();
+    memory.keep(kPlace, result, kScanned);
+    EXPECT_EQ(pick(), 0) << "nothing may lie on it any more";
+  }
+}
+
+TEST_F(PickMemoryTest, DoubtfulSecondTriesAreTheLast) {
+  scan({0, 100});
   EXPECT_EQ(pick(), 0);
   fail();
+  scan({0, 100});
+  EXPECT_EQ(pick(), 1);
+  fail();
+  DetectResult result = scan_of({0, 100});
+  result.choice.reachable[0].covered_mm = 1;
+  result.choice.reachable[0].other = vision::Reachable::Other{};
   memory.keep(kPlace, result, kScanned);
-  EXPECT_EQ(pick(), std::nullopt);
-  result.choice.reachable[0].covered_mm = 0;
+  EXPECT_EQ(pick(), 1);
+  fail();
   memory.keep(kPlace, result, kScanned);
-  EXPECT_EQ(pick(), 0) << "nothing may lie on it any more";
+  EXPECT_EQ(pick(), 0);
 }
 
 TEST_F(PickMemoryTest, ASecondTryGoesAnotherWay) {
