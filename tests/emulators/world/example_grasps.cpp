@@ -118,6 +118,17 @@ void track_link(ExamplePart& part) {
                                   -out, kZ, thick + 2 * kGap, thick, kBack));
     }
   }
+  // Over two cut corners of the high lug, above the bridge, from either side; a link that stands along a wall is taken
+  // so, the tool leaning into the supply.
+  for (const double side : {1.0, -1.0})
+    for (const double lean : {0.0, 20.0}) {
+      const Vector3d in = side * (kX - kY).normalized();
+      const Vector3d way = std::cos(lean * kDegree) * in - std::sin(lean * kDegree) * kZ;
+      const double across = std::round((40 + 40 - 20) * std::numbers::sqrt2 * 10) / 10;
+      part.grasps.push_back(
+          grasp(std::string{side > 0 ? "high_corner_out" : "high_corner_in"} + (lean == 0 ? "" : "_" + degrees(lean)),
+                -60 * kX - 20 * kY + 15 * kZ + 8 * way, way, kX + kY, across + 11, across, kBack));
+    }
   part.grasps.push_back(grasp("bridge_top", -14 * kZ, -kZ, kY, 95, 80, kBack));
   part.grasps.push_back(grasp("bridge_bottom", -3 * kZ, kZ, kY, 95, 80, kBack));
 }
@@ -136,26 +147,42 @@ void steering_wheel(ExamplePart& part) {
   }
 }
 
-/// Taken at its waist, at the contact blocks from above, below, the sides and the ends.
+/// Taken at its waist, at the contact blocks from above, below, the sides and the ends, and over its whole length.
+/// Where the jaws lie along the part, the tool may lean across it: beside a wall it leans into the supply.
 void contact_bridge(ExamplePart& part) {
-  constexpr double kGap = 2.5;
-  part.gripper = gripper(24, {2.5, 6, 30}, 18, 0.4);
+  constexpr double kGap = 2.5, kLean = 25 * kDegree;
+  part.gripper = gripper(66, {2.5, 6, 50}, 18, 0.4);
   const auto add = [&](const std::string& name, const Vector3d& tips, const Vector3d& way, const Vector3d& jaws,
                        double width) {
     part.grasps.push_back(grasp(name, tips, way, jaws, width + 2 * kGap, width, 20));
   };
+  /// Jaws along x: upright, and the tool leaning towards each of these.
+  const auto add_along = [&](const std::string& name, const Vector3d& tips, const Vector3d& way,
+                             const std::vector<Vector3d>& leans, double width) {
+    add(name, tips, way, kX, width);
+    const char* suffix = "_25";
+    for (const Vector3d& lean : leans) {
+      add(name + suffix, tips, std::cos(kLean) * way - std::sin(kLean) * lean, kX, width);
+      suffix = "_-25";
+    }
+  };
   // The waist is a plate from z = 2 to 6; the floor may be right behind it.
   add("waist_top", 0.5 * kZ, -kZ, kY, 10.8);
   add("waist_bottom", 5.2 * kZ, kZ, kY, 10.8);
+  add_along("length_top", -1 * kZ, -kZ, {kY, -kY}, 60);
+  add_along("length_bottom", 2 * kZ, kZ, {kY, -kY}, 60);
+  add_along("length_below", 2 * kY, kY, {kZ, -kZ}, 60);
+  add_along("length_above", -2 * kY, -kY, {kZ, -kZ}, 60);
   for (const double end : {-1.0, 1.0}) {
     const Vector3d block = 24 * end * kX;
     const std::string name = end < 0 ? "left" : "right";
     add(name + "_top", block - 2 * kZ, -kZ, kY, 18);
     add(name + "_bottom", block + 2 * kZ, kZ, kY, 18);
-    add(name + "_bottom_in", block + kZ, kZ, kX, 12);
+    add_along(name + "_bottom_in", block - 0.5 * kZ, kZ, {kY, -kY}, 12);
     for (const double side : {-1.0, 1.0}) {
       add(name + (side < 0 ? "_below" : "_above"), block + side * 1.5 * kY, -side * kY, kZ, 12);
-      add(name + (side < 0 ? "_below_in" : "_above_in"), block + side * 1.5 * kY - 2 * kZ, -side * kY, kX, 12);
+      add_along(name + (side < 0 ? "_below_in" : "_above_in"), block + side * 1.5 * kY - 2 * kZ, -side * kY, {-kZ},
+                12);  // on the other side is the bar
     }
     add(name + "_end_flat", 22 * end * kX, -end * kX, kZ, 12);
     add(name + "_end_wide", 22 * end * kX, -end * kX, kY, 18);
