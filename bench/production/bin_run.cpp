@@ -279,8 +279,9 @@ class BinRun {
       record_->closed_wrong = error.is_wrong;
       if (error.is_wrong) wrong_poses_ = error.poses;
     }
-    const GripResult result = emulators::grip(pile_, *recipe_.gripper, recipe_.grasps, symmetry_,
-                                              {T_stands_base_ * pick.T_base_approach, T_stands_grasp}, rules_);
+    const GripResult result = emulators::grip(
+        pile_, *recipe_.gripper, recipe_.grasps, symmetry_,
+        {T_stands_base_ * pick.T_base_approach, T_stands_grasp, T_stands_base_ * pick.T_base_retreat}, rules_);
     const bool is_taken = result.kind == GripResult::Kind::Taken;
     if (record_ != nullptr) {
       record_->grip = to_string(result.kind);
