@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 namespace binpick::vision {
 namespace {
@@ -84,14 +85,17 @@ std::vector<double> overlaps_mm(const Rasteriser& part, std::span<const Detectio
   return overlaps;
 }
 
-double overlap_mm(const Rasteriser& part, std::span<const Detection> detections, std::size_t detection,
-                  const Eigen::Isometry3d& T_supply_elsewhere, double pixel_mm) {
+OverlapElsewhere overlap_elsewhere(const Rasteriser& part, std::span<const Detection> detections, double pixel_mm) {
   Slicer slicer{part, pixel_mm};
-  const Slice own = slicer.slice(T_supply_elsewhere);
-  double widest = 0;
-  for (std::size_t other = 0; other < detections.size(); ++other)
-    if (other != detection)
-      widest = std::max(widest, pixel_mm * square_px(own, slicer.slice(detections[other].T_supply_object.iso)));
-  return widest;
+  std::vector<Slice> slices;
+  for (const Detection& detection : detections) slices.push_back(slicer.slice(detection.T_supply_object.iso));
+  return [slicer, slices = std::move(slices), pixel_mm](std::size_t detection,
+                                                        const Eigen::Isometry3d& T_supply_elsewhere) mutable {
+    const Slice own = slicer.slice(T_supply_elsewhere);
+    double widest = 0;
+    for (std::size_t other = 0; other < slices.size(); ++other)
+      if (other != detection) widest = std::max(widest, pixel_mm * square_px(own, slices[other]));
+    return widest;
+  };
 }
 }  // namespace binpick::vision

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -14,7 +15,8 @@ namespace binpick::vision {
 std::vector<double> overlaps_mm(const Rasteriser& part, std::span<const Detection> detections, double pixel_mm,
                                 const Eigen::Vector3d& up = Eigen::Vector3d::UnitZ());
 
-/// Of one detection if it stood elsewhere and the others where they are; seen from above.
-double overlap_mm(const Rasteriser& part, std::span<const Detection> detections, std::size_t detection,
-                  const Eigen::Isometry3d& T_supply_elsewhere, double pixel_mm);
+/// The same of one detection if it stood elsewhere and the others where they are; seen from above. The others are drawn
+/// once, whatever is asked.
+using OverlapElsewhere = std::function<double(std::size_t detection, const Eigen::Isometry3d& T_supply_elsewhere)>;
+OverlapElsewhere overlap_elsewhere(const Rasteriser& part, std::span<const Detection> detections, double pixel_mm);
 }  // namespace binpick::vision

@@ -48,6 +48,7 @@ std::vector<std::vector<WayOut>> ways_out(const Rasteriser& part, double diamete
       const std::vector<double> covered_mm = overlaps_mm(part, detections, pixel_mm, direction(tilt, around));
       for (std::size_t d = 0; d < fans.size(); ++d) fans[d].covered_mm[tilt][around] = covered_mm[d];
     }
+  const OverlapElsewhere overlap_mm = overlap_elsewhere(part, detections, pixel_mm);
   std::vector<std::vector<WayOut>> ways(detections.size());
   for (std::size_t d = 0; d < ways.size(); ++d) {
     if (!wanted[d]) continue;
@@ -65,8 +66,7 @@ std::vector<std::vector<WayOut>> ways_out(const Rasteriser& part, double diamete
       for (const double length : kLengths) {
         const Eigen::Vector3d way_mm = length * diameter_mm * direction(place.tilt, place.around);
         if (way_mm.z() > kHighest_mm) break;
-        const double at_end_mm =
-            overlap_mm(part, detections, d, Eigen::Translation3d{way_mm} * detections[d].T_supply_object.iso, pixel_mm);
+        const double at_end_mm = overlap_mm(d, Eigen::Translation3d{way_mm} * detections[d].T_supply_object.iso);
         if (at_end_mm > covered_max_mm) continue;
         ways[d].push_back({way_mm, std::max(fans[d].covered_mm[place.tilt][place.around], at_end_mm)});
         break;

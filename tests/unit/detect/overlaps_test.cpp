@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <map>
 #include <random>
+#include <set>
 #include <utility>
 
 #include "tests/unit/detect/shapes.hpp"
@@ -84,6 +85,28 @@ TEST(Overlaps, AreThoseOfEveryPixelOfEveryPair) {
     covered += largest > 0 ? 1 : 0;
   }
   EXPECT_GT(covered, 3);
+}
+
+TEST(Overlaps, ElsewhereAreThoseOfOneThatStandsThere) {
+  Mesh bar;
+  shapes::add_box(bar, {-30, -10, -10}, {30, 10, 10});
+  const Rasteriser part{bar};
+  std::vector<Detection> detections(3);
+  const auto at = [&](std::size_t d) -> Eigen::Isometry3d& { return detections[d].T_supply_object.iso; };
+  at(0).translation() = Eigen::Vector3d{0, 0, 10};
+  at(1).translation() = Eigen::Vector3d{0, 12, 31};
+  at(2).translation() = Eigen::Vector3d{90, 4, 31};
+  const auto elsewhere = overlap_elsewhere(part, detections, kPixelMm);
+  std::set<double> found;
+  for (const double x : {0.0, 20.0, 60.0, 75.0, 130.0, 400.0}) {
+    const Eigen::Isometry3d T{Eigen::Translation3d{x, -3, 14} * Eigen::AngleAxisd{0.3, Eigen::Vector3d::UnitX()}};
+    auto moved = detections;
+    moved[0].T_supply_object.iso = T;
+    EXPECT_EQ(elsewhere(0, T), overlaps_mm(part, moved, kPixelMm)[0]) << x;
+    found.insert(elsewhere(0, T));
+  }
+  EXPECT_GT(found.size(), 2U) << "all alike";
+  EXPECT_EQ(elsewhere(0, at(0)), overlaps_mm(part, detections, kPixelMm)[0]) << "asked again";
 }
 
 TEST(Overlaps, AreAsWideAsTheStripThatIsCovered) {
