@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "base/crc32.hpp"
+#include "daemon/cycle/replay.hpp"
 #include "tests/unit/cycle/records.hpp"
 
 namespace binpick::daemon {
@@ -114,6 +115,17 @@ TEST(RecordCodec, EveryFieldComesBack) {
   EXPECT_TRUE(result.supply_empty);
   EXPECT_EQ(decoded->answer->registers, (std::vector<std::uint16_t>{1, 2, 65535}));
   EXPECT_EQ(decoded->answer->alarm, plc::Alarm::ScanTimeout);
+}
+
+// Records of before the retreat pose do not tell it: nothing to compare with, and no difference.
+TEST(RecordCodec, AReplayComparesTheRetreatPoseWhereItIsRecorded) {
+  const DetectResult now = result_of_all_fields();
+  DetectResult then = now;
+  EXPECT_TRUE(differences(then, now).empty());
+  then.choice.reachable.at(0).T_supply_retreat = {};
+  EXPECT_TRUE(differences(then, now).empty());
+  then.choice.reachable.at(0).T_supply_retreat = transform_of<frame::Supply, frame::Tcp>(1.4);
+  EXPECT_EQ(differences(then, now).size(), 1U);
 }
 
 TEST(RecordCodec, AnEmptyRecordIsOne) {
