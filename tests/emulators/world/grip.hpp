@@ -23,9 +23,10 @@
 ///    grasp in its own place would touch, within `touch_mm`), when the jaws then stand as far apart as there, within
 ///    `width_mm`, and when nothing else is between them. Without jaws it is held when the foremost face lies on it
 ///    flatly.
-/// 3. Along a line to the retreat pose, where there is one, and straight up from there. The gripper must not hit. The object may brush what it touched already; deeper than `push_mm` into
-///    another one, or into the supply, than when it was gripped is a collision: what lies on it is lifted or thrown
-///    off. Here the convex pieces of the physics stand for the objects.
+/// 3. Along a line to the retreat pose, where there is one, and straight up from there. The gripper must not hit. The
+///    object may brush what it touched already; deeper than `push_mm` into another one, or into the supply, than when
+///    it was gripped is a collision: what lies on it is lifted or thrown off. Here the convex pieces of the physics
+///    stand for the objects.
 ///
 /// After a miss or a collision the object stays where it is, and so does all else.
 namespace binpick::emulators {
