@@ -259,6 +259,13 @@ TEST(RobotDocs, TheUrProgramOpensAndClosesItsBlocksAndCallsWhatIsThere) {
   }
 }
 
+// An answer of another version comes at once: without a pause the program would connect as fast as it can.
+TEST(RobotDocs, BackgroundProgramsConnectOnceASecondAtMost) {
+  expect_in_order(part_of(read_page("fanuc"), "ROUTINE open_cell", "END open_cell"),
+                  {"close_cell", "DELAY 1000", "MSG_CONNECT"});
+  expect_in_order(part_of(read_page("kawasaki"), ".PROGRAM bpconn.pc", ".END"), {"TWAIT 1 ", "TCP_CONNECT"});
+}
+
 // In along the line, closed, aside to the retreat pose, straight up from there, on record before the arm moves.
 TEST(RobotDocs, EachProgramDrawsThePartOutByWayOfTheRetreatPose) {
   expect_in_order(part_of(read_page(), "def pick():", "def to_path"),
