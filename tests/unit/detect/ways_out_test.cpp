@@ -1,5 +1,6 @@
 #include "vision/ways_out.hpp"
 
+#include <cmath>
 #include <gtest/gtest.h>
 
 #include "tests/unit/detect/table.hpp"
@@ -21,12 +22,12 @@ Eigen::Isometry3d across_it(double x = 0) {
   return Eigen::Translation3d{at} * Eigen::AngleAxisd{kPi / 2, Vector3d::UnitZ()} * Eigen::Isometry3d::Identity();
 }
 
-std::vector<WayOut> of_first(const std::vector<Eigen::Isometry3d>& bars, bool wanted = true) {
+std::vector<WayOut> of_first(const std::vector<Eigen::Isometry3d>& bars, bool wanted = true, double diameter_mm = 60) {
   std::vector<Detection> detections;
   for (const auto& T : bars) detections.emplace_back().T_supply_object.iso = T;
   std::vector<bool> mask(bars.size(), false);
   mask[0] = wanted;
-  return ways_out(Rasteriser{bar()}, 60, detections, mask, kPixelMm, kLimitMm).at(0);
+  return ways_out(Rasteriser{bar()}, diameter_mm, detections, mask, kPixelMm, kLimitMm).at(0);
 }
 }  // namespace
 
@@ -54,6 +55,12 @@ TEST(WaysOut, FarEnoughToPassStraightUpFromThere) {
   ASSERT_FALSE(without.empty());
   ASSERT_FALSE(with.empty());
   EXPECT_GT(with.front().way_mm.norm(), without.front().way_mm.norm() + 1);
+}
+
+TEST(WaysOut, NoHigherThanRobotProgramsLift) {
+  const auto ways = of_first({leaning(), across_it()}, true, 1000);
+  ASSERT_FALSE(ways.empty());
+  for (const WayOut& way : ways) EXPECT_LE(way.way_mm.z(), 250);
 }
 
 /// The whole choice.
@@ -109,6 +116,51 @@ TEST_F(Aslant, NotWhileSomethingCanBeLiftedStraightUp) {
 TEST_F(Aslant, NotThroughWhatWasNotFound) {
   scene.lay_block(32, 60, -60, 60, 79);
   EXPECT_FALSE(taken());
+}
+
+TEST_F(Aslant, NotWhereThePartAloneWouldHit) {
+  scene.lay_block(32, 60, -8, 8, 70);  // between the jaws, under the palm
+  EXPECT_FALSE(taken());
+}
+
+TEST_F(Aslant, NotWhereTheJawsAloneWouldHit) {
+  for (const double side : {-18.0, 18.0}) scene.lay_block(24, 60, side - 5, side + 5, 80);
+  EXPECT_FALSE(taken());
+}
+
+TEST_F(Aslant, NotWhereTheJawsWouldHitWhatWasFound) {
+  // Too steep to be taken themselves.
+  for (const double side : {-1.0, 1.0}) scene.lay({62, 26 * side, 60}, 0, side);
+  EXPECT_FALSE(taken());
+}
+
+TEST_F(Aslant, NotWhereTheGripperHasNoWayIn) {
+  scene.lay_block(-90, -70, -20, 20, 120);  // under the palm at the approach pose
+  EXPECT_FALSE(taken());
+}
+
+TEST_F(Aslant, AfterWhatIsTightStraightUp) {
+  scene.lay({90, 60.2, 10});
+  scene.lay_block(60, 120, 86.4, 110, 40);  // .3 mm beside the open jaws
+  const GraspChoice choice = scene.choose({at_end()}, limits);
+  ASSERT_EQ(choice.reachable.size(), 2U);
+  EXPECT_EQ(choice.reachable[0].detection, 2U);
+  EXPECT_TRUE(choice.reachable[0].is_tight);
+  EXPECT_TRUE(choice.reachable[1].is_aslant);
+}
+
+TEST_F(Aslant, ItsOtherGraspOrWayIsAnother) {
+  Grasp beside = at_end();
+  beside.T_object_tcp.iso.translation().x() -= 4;
+  const GraspChoice choice = scene.choose({at_end(), beside}, limits);
+  ASSERT_EQ(choice.reachable.size(), 1U);
+  const Reachable& pick = choice.reachable.front();
+  ASSERT_TRUE(pick.other);
+  const auto way = [](const auto& one) {
+    return (one.T_supply_retreat.iso.translation() - one.T_supply_grasp.iso.translation()).normalized();
+  };
+  EXPECT_TRUE(!is_same_way(pick.T_supply_grasp, pick.other->T_supply_grasp) ||
+              way(pick).dot(way(*pick.other)) < std::cos(10 * kPi / 180));
 }
 
 TEST_F(Aslant, NotWhereTheArmDoesNotReach) {
