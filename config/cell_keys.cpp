@@ -303,12 +303,13 @@ const std::vector<Section<Config>>& cell_sections() {
              .help = "Gripper and held part stay this far from walls, floor and all that was measured. Default: 0.3 of "
                      "the noise of the part's scanner class. Where there is more room, a grasp goes first."},
             [](C& c) -> Slot { return &c.reach.clearance_mm; }},
-           {{.name = "unmeasured", .type = Choice, .default_value = "\"blocked\"", .choices = {"free", "blocked"},
+           {{.name = "unmeasured", .type = Choice, .default_value = "\"blocked\"", .choices = {"free", "blocked", "last"},
              .help = "What stands where the scanner saw nothing: nothing; or what surrounds that place goes on in it, and "
-                     "a shadow hides as much as it can. With \"free\" such grasps are still the last choice."},
+                     "a shadow hides as much as it can. With \"free\" such grasps are still the last choice; with \"last\" "
+                     "they are offered only where nothing else can be taken."},
             [](C& c) -> Slot {
               using enum vision::Unmeasured;
-              return chosen(c.reach.unmeasured, {Free, Blocked});
+              return chosen(c.reach.unmeasured, {Free, Blocked, Last});
             }},
            {{.name = "radius_max_mm", .type = Number, .unit = "mm", .max = 20000, .default_value = "0",
              .help = "The tcp stays within this distance of the origin of the robot's base, at the grasp and at the "

@@ -193,6 +193,15 @@ std::vector<Eigen::Isometry3d> poses_of(const Grasp& grasp, const Transform<fram
 
 GraspChoice choose_grasps(const DetectionReport& report, const Symmetry& symmetry, const std::vector<Grasp>& grasps,
                           const SupplyBox& supply, const ReachLimits& limits, const GripperScene* scene) {
+  if (limits.unmeasured == Unmeasured::Last) {
+    ReachLimits narrower = limits;
+    narrower.unmeasured = Unmeasured::Blocked;
+    const GraspChoice choice = choose_grasps(report, symmetry, grasps, supply, narrower, scene);
+    const auto in_holes = [](const RejectedGrasp& one) { return one.why == Obstacle::Unmeasured; };
+    if (!choice.reachable.empty() || std::ranges::none_of(choice.rejected, in_holes)) return choice;
+    narrower.unmeasured = Unmeasured::Free;
+    return choose_grasps(report, symmetry, grasps, supply, narrower, scene);
+  }
   const Eigen::Vector3d up = limits.T_base_supply.iso.linear().transpose() * Eigen::Vector3d::UnitZ();
   std::optional<GraspChecks> checks;
   if (scene != nullptr && !report.detections.empty()) checks.emplace(report, grasps, supply, limits, *scene);

@@ -45,7 +45,7 @@ GraspChecks::GraspChecks(const DetectionReport& report, const std::vector<Grasp>
       clearance_mm_{limits.clearance_mm.value_or(kClearanceNoises * scene.noise_mm)},
       part_{scene.part},
       around_{scene.image, supply, part_, report.detections, scene.noise_mm},
-      holes_{limits.unmeasured == Unmeasured::Blocked},
+      holes_{limits.unmeasured != Unmeasured::Free},
       highest_mm_{static_cast<double>(around_.highest_mm())},
       overlaps_mm_{vision::overlaps_mm(part_, report.detections, fine_pixel_mm(scene))},
       up_{limits.T_base_supply.iso.linear().transpose() * Eigen::Vector3d::UnitZ()},

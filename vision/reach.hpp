@@ -12,6 +12,7 @@ namespace binpick::vision {
 enum class Unmeasured {
   Free,     ///< Nothing.
   Blocked,  ///< What surrounds that place goes on in it, and a shadow may hide as much as it can.
+  Last,     ///< As blocked while anything can be taken so; then as free.
 };
 
 struct ReachLimits {

@@ -64,6 +64,7 @@ allow = []
 
 [reach]
 tilt_max_deg = 50
+unmeasured = "last"
 
 [picks]
 per_scan = 4

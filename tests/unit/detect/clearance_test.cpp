@@ -136,6 +136,22 @@ TEST(Clearance, WhereHolesAreFreeTheyAreTheLastChoice) {
   EXPECT_EQ(choice.reachable[1].clearance_mm, 0);
 }
 
+TEST(Clearance, HolesMayBeFreeOnlyWhereNothingElseCanBeTaken) {
+  Table table{bar()};
+  table.lay({0, 50, 40});
+  table.lay_block(-60, 60, 82, 119, 75);
+  table.image.z_mm.block(180, 90, 22, 120).setConstant(kHole);  // y from 60 to 82
+  ReachLimits limits = usual();
+  limits.unmeasured = Unmeasured::Blocked;
+  EXPECT_TRUE(table.choose({across_bar()}, limits).reachable.empty());
+  limits.unmeasured = Unmeasured::Last;
+  EXPECT_EQ(table.choose({across_bar()}, limits).reachable.size(), 1U);
+  table.lay({0, -50, 10});
+  const GraspChoice choice = table.choose({across_bar()}, limits);
+  ASSERT_EQ(choice.reachable.size(), 1U);
+  EXPECT_EQ(choice.reachable[0].detection, 1U);
+}
+
 TEST(Clearance, ATiltedWayIsFreeAlongAllOfIt) {
   // Coming in from +y, tilted by 30 degrees; a bank stands there, higher than the bar, well beside the grasp itself.
   Table table{bar()};
