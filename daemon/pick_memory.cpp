@@ -56,11 +56,12 @@ std::optional<PickMemory::Pick> PickMemory::next(const Place& place, const confi
     if (failure == nullptr) return Pick{i, false, false, left};
     const vision::Reachable& reachable = scan.result.choice.reachable[i];
     if (!fresh || failure->picks >= kPicksMax) continue;
-    const bool other = reachable.other && vision::is_same_way(reachable.T_supply_grasp, failure->T_supply_grasp);
+    const bool is_same = vision::is_same_way(reachable.T_supply_grasp, failure->T_supply_grasp);
+    const bool other = reachable.other && is_same;
     // What was doubtful before it failed is hardly better the second time.
     const bool is_doubtful = reachable.covered_mm > 0 || reachable.is_aslant;
     std::optional<Pick>& place_in_line = is_doubtful ? last : again;
-    if (!place_in_line && (other || !is_doubtful)) place_in_line = Pick{i, true, other, left};
+    if (!place_in_line && (other || !is_same || !is_doubtful)) place_in_line = Pick{i, true, other, left};
   }
   return again ? again : last;
 }

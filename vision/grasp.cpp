@@ -112,7 +112,10 @@ bool got_farther(const RejectedGrasp& a, const RejectedGrasp& b) {
 /// Objects that hang in others and so cannot be lifted straight up: by a grasp along a way on which they pass them.
 void add_aslant(GraspChecks& checks, const std::vector<std::vector<Candidate>>& candidates,
                 const std::vector<Grasp>& grasps, const ReachLimits& limits, GraspChoice& choice) {
-  const std::vector<std::vector<WayOut>> ways = checks.ways_past_others();
+  std::vector<bool> wanted(candidates.size(), false);
+  for (const Unreachable& one : choice.unreachable)
+    wanted[one.detection] = one.why == Obstacle::Covered && !candidates[one.detection].empty();
+  const std::vector<std::vector<WayOut>> ways = checks.ways_past_others(wanted);
   const auto is_reached = [&](const Candidate& candidate, const WayOut& way) {
     const Eigen::Vector3d at = limits.T_base_supply.iso * (candidate.T_supply_tcp.translation() + way.way_mm);
     return !is_too_far(at, limits) && !is_too_near(at, limits);
@@ -124,7 +127,7 @@ void add_aslant(GraspChecks& checks, const std::vector<std::vector<Candidate>>& 
            before.normalized().dot(way.way_mm.normalized()) < std::cos(kSameWayRad);
   };
   const auto taken_aslant = [&](std::size_t d) {
-    if (ways[d].empty() || candidates[d].empty()) return false;
+    if (ways[d].empty()) return false;
     checks.begin(d, candidates[d], ways[d]);
     std::vector<Candidate> free;
     for (const Candidate& candidate : candidates[d])

@@ -16,6 +16,8 @@ constexpr double kClearanceNoises = 0.3;
 /// Something that a shadow hides deeper than this is not met by jaws.
 constexpr double kHiddenMm = 100;
 constexpr double kSlackNoises = 1;
+/// A supply whose z is nearer to the base's than this stands level as far as ways aslant go.
+constexpr double kLevelRad = 0.0175;
 /// Ways aslant are looked for with pixels so much coarser than what lies on an object.
 constexpr double kAslantPixels = 2;
 
@@ -47,8 +49,8 @@ GraspChecks::GraspChecks(const DetectionReport& report, const std::vector<Grasp>
       around_{scene.image, supply, part_, report.detections, scene.noise_mm},
       holes_{limits.unmeasured != Unmeasured::Free},
       highest_mm_{static_cast<double>(around_.highest_mm())},
-      overlaps_mm_{vision::overlaps_mm(part_, report.detections, fine_pixel_mm(scene))},
       up_{limits.T_base_supply.iso.linear().transpose() * Eigen::Vector3d::UnitZ()},
+      overlaps_mm_{vision::overlaps_mm(part_, report.detections, fine_pixel_mm(scene), up_)},
       slants_{up_.head<2>().norm() > 1e-3 || up_.z() < 0},
       hits_part_(grasps.size()) {
   for (const Grasp& grasp : grasps) sweepers_.push_back(sweepers_of(scene.gripper, grasp));
@@ -128,12 +130,12 @@ RejectedGrasp GraspChecks::check(const Candidate& candidate, double& clearance_m
   return found;
 }
 
-std::vector<std::vector<WayOut>> GraspChecks::ways_past_others() const {
+std::vector<std::vector<WayOut>> GraspChecks::ways_past_others(std::vector<bool> wanted) const {
   const double most_mm = kCoveredMaxNoises * scene_.noise_mm, pixel_mm = kAslantPixels * fine_pixel_mm(scene_);
-  std::vector<bool> wanted(report_.detections.size(), false);
-  // In a supply that stands aslant the end of a way is not free upwards because its beginning is.
-  for (std::size_t d = 0; d < wanted.size() && !slants_; ++d)
-    wanted[d] = overlaps_mm_[d] > most_mm && around_.covered_mm(d) <= most_mm;
+  // In a supply that stands slanted the end of a way is not free upwards because its beginning is.
+  const bool is_level = up_.z() > std::cos(kLevelRad);
+  for (std::size_t d = 0; d < wanted.size(); ++d)
+    wanted[d] = wanted[d] && is_level && overlaps_mm_[d] > most_mm && around_.covered_mm(d) <= most_mm;
   if (std::ranges::find(wanted, true) == wanted.end()) return std::vector<std::vector<WayOut>>(wanted.size());
   return ways_out(part_, diameter_mm(scene_.part), report_.detections, wanted, pixel_mm, pixel_mm);
 }
@@ -152,19 +154,22 @@ bool GraspChecks::is_free_in(const Candidate& candidate) {
 
 bool GraspChecks::is_free_along(const Candidate& candidate, const WayOut& way) {
   if (!foreign_) foreign_ = around_.foreign(heights_, detection_);
+  const Eigen::Isometry3d T_supply_retreat = Eigen::Translation3d{way.way_mm} * candidate.T_supply_tcp;
   return std::ranges::all_of(sweepers_[candidate.grasp], [&](const Gripper::Solid& solid) {
     const Swept out{solid, candidate.T_supply_tcp, way.way_mm, clearance_mm_};
-    return contact(out, *foreign_, supply_, holes_).with == Obstacle::None && passes_others(solid, candidate, way);
+    return contact(out, *foreign_, supply_, holes_).with == Obstacle::None &&
+           passes_others(solid, candidate.T_supply_tcp, way.way_mm) &&
+           passes_others(solid, T_supply_retreat, highest_mm_ * up_);
   });
 }
 
 /// Under the others' surfaces is room on a way aslant: they are met as they are.
-bool GraspChecks::passes_others(const Gripper::Solid& solid, const Candidate& candidate, const WayOut& way) const {
+bool GraspChecks::passes_others(const Gripper::Solid& solid, const Eigen::Isometry3d& T_supply_tcp,
+                                const Eigen::Vector3d& way_mm) const {
   for (std::size_t other = 0; other < report_.detections.size(); ++other) {
     if (other == detection_) continue;
     const Eigen::Isometry3d T_object_supply = report_.detections[other].T_supply_object.iso.inverse();
-    const Swept out{solid, T_object_supply * candidate.T_supply_tcp, T_object_supply.linear() * way.way_mm,
-                    clearance_mm_};
+    const Swept out{solid, T_object_supply * T_supply_tcp, T_object_supply.linear() * way_mm, clearance_mm_};
     if (meets(out, scene_.part)) return false;
   }
   return true;

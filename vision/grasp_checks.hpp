@@ -33,13 +33,14 @@ class GraspChecks {
   /// In, and straight up. None: it is free, with `clearance_mm` around it.
   RejectedGrasp check(const Candidate& candidate, double& clearance_mm);
 
-  /// Ways past the others for those detections which only others of them lie on; none for the rest.
-  std::vector<std::vector<WayOut>> ways_past_others() const;
+  /// Ways past the others for those `wanted` detections which only others of them lie on; none for the rest, and none
+  /// in a supply that is slanted by more than a degree.
+  std::vector<std::vector<WayOut>> ways_past_others(std::vector<bool> wanted) const;
   /// Whether the part that was taken up passes along it all that is no detection, and the walls.
   bool part_passes(const WayOut& way);
   /// Whether the gripper is free on the way in, whatever lies on the object.
   bool is_free_in(const Candidate& candidate);
-  /// Whether it is along `way`, from the grasp.
+  /// Whether it is along `way`, from the grasp, and straight up from its end.
   bool is_free_along(const Candidate& candidate, const WayOut& way);
 
   /// How far others may reach over the detection that was taken up; 0: hardly.
@@ -56,7 +57,8 @@ class GraspChecks {
   Eigen::Vector3d way_in(const Candidate& candidate) const;  ///< To the approach pose, from the grasp.
   double lift_mm(const Grasp& grasp) const;                  ///< As far along up_ as the part has to pass.
   Eigen::AlignedBox3d box_of(const Gripper::Solid& solid, const Candidate& candidate, double times) const;
-  bool passes_others(const Gripper::Solid& solid, const Candidate& candidate, const WayOut& way) const;
+  bool passes_others(const Gripper::Solid& solid, const Eigen::Isometry3d& T_supply_tcp,
+                     const Eigen::Vector3d& way_mm) const;
   Contact contact_of_gripper(const Candidate& candidate, double times, bool holes) const;
 
   const DetectionReport& report_;
@@ -68,8 +70,8 @@ class GraspChecks {
   Surroundings around_;
   bool holes_;  ///< Block the way.
   double highest_mm_;
-  std::vector<double> overlaps_mm_;  ///< Of each detection: how far others reach over it.
   Eigen::Vector3d up_;               ///< The arm's way out.
+  std::vector<double> overlaps_mm_;  ///< Of each detection: how far others reach over it, seen along that.
   /// Where the supply stands level, a way straight up is as free as its beginning: all is solid from its surface down.
   bool slants_;
   std::vector<std::vector<Gripper::Solid>> sweepers_;  ///< Of each grasp.

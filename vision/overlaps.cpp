@@ -73,14 +73,14 @@ int square_px(const Slice& object, const Slice& other) {
 }  // namespace
 
 std::vector<double> overlaps_mm(const Rasteriser& part, std::span<const Detection> detections, double pixel_mm,
-                                const Eigen::Vector3d& up) {
+                                const Eigen::Vector3d& up, const std::vector<bool>& wanted) {
   const Eigen::Quaterniond upright = Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ());
   Slicer slicer{part, pixel_mm};
   std::vector<Slice> slices;
   for (const Detection& detection : detections) slices.push_back(slicer.slice(upright * detection.T_supply_object.iso));
   std::vector<double> overlaps(detections.size(), 0);
   for (std::size_t a = 0; a < slices.size(); ++a)
-    for (std::size_t b = 0; b < slices.size(); ++b)
+    for (std::size_t b = 0; b < slices.size() && (wanted.empty() || wanted[a]); ++b)
       if (a != b) overlaps[a] = std::max(overlaps[a], pixel_mm * square_px(slices[a], slices[b]));
   return overlaps;
 }

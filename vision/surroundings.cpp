@@ -296,19 +296,25 @@ Heights Surroundings::foreign(Heights heights, std::size_t detection) const {
   const Eigen::Vector2d at = (heights.origin_mm - origin_mm_) / pixel_mm_;
   const int row0 = static_cast<int>(std::lround(at.y())), col0 = static_cast<int>(std::lround(at.x()));
   const auto rows = static_cast<int>(heights.z_mm.rows()), cols = static_cast<int>(heights.z_mm.cols());
+  // The highest of the others at each pixel and about it: along their outlines heights are mixed of both sides.
+  Grid<float> tops = Grid<float>::Constant(rows, cols, kNothing);
   for (std::size_t other = 0; other < drawn_.size(); ++other) {
     if (other == detection) continue;
     const Template& drawn = drawn_[other];
     for (int r = 0; r < drawn.rows; ++r)
       for (int c = 0; c < drawn.cols; ++c) {
-        if (std::isnan(drawn.top_mm[drawn.at(r, c)])) continue;
-        // Along its outline heights are mixed of both sides.
+        const float top = drawn.top_mm[drawn.at(r, c)];
+        if (std::isnan(top)) continue;
         const int row = r + drawn.row0 - row0, col = c + drawn.col0 - col0;
         for (int k = std::max(0, row - kRimPx); k <= std::min(rows - 1, row + kRimPx); ++k)
           for (int l = std::max(0, col - kRimPx); l <= std::min(cols - 1, col + kRimPx); ++l)
-            heights.kind(k, l) = Heights::Kind::Hole, heights.z_mm(k, l) = 0;
+            if (!(tops(k, l) >= top)) tops(k, l) = top;
       }
   }
+  for (int r = 0; r < rows; ++r)
+    for (int c = 0; c < cols; ++c)
+      if (heights.z_mm(r, c) <= tops(r, c) + fits_mm_)  // else something that was not found lies on it
+        heights.kind(r, c) = Heights::Kind::Hole, heights.z_mm(r, c) = 0;
   return heights;
 }
 

@@ -39,7 +39,8 @@ class Surroundings {
 
   /// Of the window, which is cut to the picture.
   Heights without(std::size_t detection, const DepthWindow& window) const;
-  /// Of these heights, around `detection`, what no other detection explains or stands beside; there, all is free.
+  /// Of these heights, around `detection`, what no other detection explains: where one stands, or right beside it, only
+  /// what is higher than it; else all is free there.
   Heights foreign(Heights heights, std::size_t detection) const;
   float highest_mm() const;
   /// Side of the largest square of a detection, less a pixel, above which something lies that was not found.

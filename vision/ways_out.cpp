@@ -45,7 +45,7 @@ std::vector<std::vector<WayOut>> ways_out(const Rasteriser& part, double diamete
   std::vector<Fan> fans(detections.size());
   for (std::size_t tilt = 0; tilt < kTilts.size(); ++tilt)
     for (std::size_t around = 0; around < kAround; ++around) {
-      const std::vector<double> covered_mm = overlaps_mm(part, detections, pixel_mm, direction(tilt, around));
+      const std::vector<double> covered_mm = overlaps_mm(part, detections, pixel_mm, direction(tilt, around), wanted);
       for (std::size_t d = 0; d < fans.size(); ++d) fans[d].covered_mm[tilt][around] = covered_mm[d];
     }
   const OverlapElsewhere overlap_mm = overlap_elsewhere(part, detections, pixel_mm);

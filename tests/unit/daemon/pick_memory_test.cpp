@@ -139,6 +139,13 @@ TEST_F(PickMemoryTest, WhatAnotherOneMayLieOnIsTriedAgainOnlyByAnotherGrasp) {
     const auto again = memory.next(kPlace, options, kScanned);
     ASSERT_TRUE(again);
     EXPECT_TRUE(again->again && again->other);
+    DetectResult elsewhere = result;
+    elsewhere.choice.reachable[0].other.reset();
+    elsewhere.choice.reachable[0].T_supply_grasp.iso.translation().x() += 20;
+    memory.keep(kPlace, elsewhere, kScanned);
+    const auto by_first = memory.next(kPlace, options, kScanned);
+    ASSERT_TRUE(by_first) << "it is another grasp already";
+    EXPECT_TRUE(by_first->again && !by_first->other);
     result.choice.reachable[0].covered_mm = 0;
     result.choice.reachable[0].is_aslant = false;
     result.choice.reachable[0].other.reset();

@@ -118,6 +118,19 @@ TEST_F(Aslant, NotThroughWhatWasNotFound) {
   EXPECT_FALSE(taken());
 }
 
+TEST_F(Aslant, NotThroughWhatLiesOnAnotherOne) {
+  scene.lay_block(35, 57, -31, 31, 79);
+  scene.lay({46, 0, 10}, kPi / 2);
+  ASSERT_EQ(scene.image.z_mm(120, 196), 79) << "over the one that was found";
+  EXPECT_FALSE(taken());
+}
+
+TEST_F(Aslant, NotWhereTheGripperWouldHitOnTheWayUpFromThere) {
+  // The part passes between them, the jaws do not. Too steep to be taken themselves.
+  for (const double side : {-1.0, 1.0}) scene.lay({28, 43 * side, 125}, kPi / 2, 1);
+  EXPECT_FALSE(taken());
+}
+
 TEST_F(Aslant, NotWhereThePartAloneWouldHit) {
   scene.lay_block(32, 60, -8, 8, 70);  // between the jaws, under the palm
   EXPECT_FALSE(taken());
@@ -178,8 +191,13 @@ TEST_F(Aslant, NotWhereTheArmDoesNotReach) {
 }
 
 TEST_F(Aslant, NotInASupplyThatStandsAslant) {
-  limits.T_base_supply.iso.linear() = Eigen::AngleAxisd{0.1, Vector3d::UnitY()}.toRotationMatrix();
-  EXPECT_FALSE(taken());
+  const auto slanted_by = [&](double angle_rad) {
+    limits.T_base_supply.iso.linear() = Eigen::AngleAxisd{angle_rad, Vector3d::UnitY()}.toRotationMatrix();
+    return taken().has_value();
+  };
+  EXPECT_TRUE(slanted_by(0.01)) << "taught, it never stands quite level";
+  EXPECT_TRUE(slanted_by(-0.01));
+  EXPECT_FALSE(slanted_by(0.03));
 }
 
 class AslantAtAWall : public Aslant {
