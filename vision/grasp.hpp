@@ -97,7 +97,7 @@ struct GripperScene {
 /// Of those that are free the first with plenty of room is taken, or else the roomiest. Without a scene only the tcp is
 /// kept from the walls, and the steepest of the preferred is taken. Where nothing has plenty of room straight up,
 /// objects that hang in others are offered with a retreat pose to which they can be drawn past them (ways_out.hpp);
-/// only in supplies that stand level.
+/// only in supplies that stand level within a degree.
 GraspChoice choose_grasps(const DetectionReport& report, const Symmetry& symmetry, const std::vector<Grasp>& grasps,
                           const SupplyBox& supply, const ReachLimits& limits, const GripperScene* scene = nullptr);
 }  // namespace binpick::vision

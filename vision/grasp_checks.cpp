@@ -140,11 +140,15 @@ std::vector<std::vector<WayOut>> GraspChecks::ways_past_others(std::vector<bool>
   return ways_out(part_, diameter_mm(scene_.part), report_.detections, wanted, pixel_mm, pixel_mm);
 }
 
+const Heights& GraspChecks::foreign() {
+  if (!foreign_) foreign_ = around_.foreign(heights_, detection_);
+  return *foreign_;
+}
+
 bool GraspChecks::part_passes(const WayOut& way) {
   if (!lower_side_) lower_side_ = around_.lower_side(detection_);
-  if (!foreign_) foreign_ = around_.foreign(heights_, detection_);
   return contact_of_part(*lower_side_, scene_.image.origin_mm, way.way_mm.normalized(), way.way_mm.norm(),
-                         kSlackNoises * scene_.noise_mm, *foreign_, supply_)
+                         kSlackNoises * scene_.noise_mm, foreign(), supply_)
              .with == Obstacle::None;
 }
 
@@ -153,11 +157,10 @@ bool GraspChecks::is_free_in(const Candidate& candidate) {
 }
 
 bool GraspChecks::is_free_along(const Candidate& candidate, const WayOut& way) {
-  if (!foreign_) foreign_ = around_.foreign(heights_, detection_);
   const Eigen::Isometry3d T_supply_retreat = Eigen::Translation3d{way.way_mm} * candidate.T_supply_tcp;
   return std::ranges::all_of(sweepers_[candidate.grasp], [&](const Gripper::Solid& solid) {
     const Swept out{solid, candidate.T_supply_tcp, way.way_mm, clearance_mm_};
-    return contact(out, *foreign_, supply_, holes_).with == Obstacle::None &&
+    return contact(out, foreign(), supply_, holes_).with == Obstacle::None &&
            passes_others(solid, candidate.T_supply_tcp, way.way_mm) &&
            passes_others(solid, T_supply_retreat, highest_mm_ * up_);
   });

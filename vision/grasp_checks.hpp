@@ -54,6 +54,7 @@ class GraspChecks {
   static constexpr double kCoveredMaxNoises = 2, kCoveredNoises = 0.3;
 
   bool hits_itself(const Candidate& candidate);
+  const Heights& foreign();  ///< Around the detection that was taken up, without what the others explain.
   Eigen::Vector3d way_in(const Candidate& candidate) const;  ///< To the approach pose, from the grasp.
   double lift_mm(const Grasp& grasp) const;                  ///< As far along up_ as the part has to pass.
   Eigen::AlignedBox3d box_of(const Gripper::Solid& solid, const Candidate& candidate, double times) const;
@@ -78,7 +79,7 @@ class GraspChecks {
   std::vector<std::optional<bool>> hits_part_;
   std::size_t detection_ = 0;
   Heights heights_;
-  std::optional<Heights> foreign_;  ///< Without what the other detections explain.
+  std::optional<Heights> foreign_;
   std::optional<Template> lower_side_;
   double covered_mm_ = 0;
 };

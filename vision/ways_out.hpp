@@ -11,7 +11,7 @@
 namespace binpick::vision {
 struct WayOut {
   Eigen::Vector3d way_mm;  ///< In a straight line, the part turned as it is; from its end on straight up.
-  double covered_mm = 0;   ///< So far others still reach over it on that way (overlaps.hpp); what was allowed.
+  double covered_mm = 0;   ///< So far others still reach over it on that way (overlaps.hpp).
 };
 
 /// For each detection that is `wanted` the ways on which it passes all the others, by their poses; first those where
